@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""lgvi_warp: many underwater vehicles at once, by a Lie group variational integrator in Warp kernels on CPU cores."""
+"""lgvi_warp: simulation of many underwater vehicles by a Lie group variational integrator, in Warp kernels on CPU cores."""
 
 from lgvi_warp.common.doors import names_in_stub as _names_in_stub
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Start the command, as `lgvi-warp` or `python -m lgvi_warp`: signals are heard while its libraries are imported."""
+"""Start the command, as `lgvi-warp` or `python -m lgvi_warp`; signals are handled even while its libraries are imported."""
 
 import os
 import signal
@@ -7,7 +7,7 @@ from types import FrameType
 
 
 def entry() -> None:
-    """Run the command as the console script does: install signal handlers, then import the rest."""
+    """Entry point of the console script: install signal handlers, then import and run the command."""
     for name in ("SIGINT", "SIGTERM", "SIGHUP"):
         number = getattr(signal, name, None)
         # An ignored signal, as under nohup, stays ignored.
@@ -19,7 +19,7 @@ def entry() -> None:
 
 
 def _end(number: int, frame: FrameType | None) -> None:
-    """End at once: nothing has begun, so nothing is lost."""
+    """End the process at once; the command has not begun, so nothing is lost."""
     os.write(2, b"lgvi-warp: interrupted; nothing was written\n")
     os._exit(128 + number)
 

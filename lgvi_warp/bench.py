@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Cost of a run on this machine: against members and threads, and by term."""
+"""Cost of a run on this machine: as a function of members and threads, and of each term."""
 
 from lgvi_warp.common.doors import names_in_stub
 

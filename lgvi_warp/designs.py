@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Designs: how the members' numbers are chosen, for `Ensemble(sampling=...)`."""
+"""Designs, the rules that choose the members' numbers, for `Ensemble(sampling=...)`."""
 
 from lgvi_warp.common.doors import names_in_stub
 

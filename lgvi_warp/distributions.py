@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Distributions: how what varies is spread over the members, for `Ensemble(vary={...})`."""
+"""Distributions of the numbers that vary between members, for `Ensemble(vary={...})`."""
 
 from lgvi_warp.common.doors import names_in_stub
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Events: what stops a member, for `Scene(events=[...])`."""
+"""Events, the conditions that stop a member, for `Scene(events=[...])`."""
 
 from lgvi_warp.common.doors import names_in_stub
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Vehicles as an environment of Gymnasium."""
+"""Vehicles as a vector environment of Gymnasium or Stable-Baselines3."""
 
 from lgvi_warp.common.doors import names_in_stub
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Imports of an author of device code: bases of terms and of parts of a controller, and the checks of both."""
+"""Names for authors of device code: base classes of terms and of parts of a controller, and checks for both."""
 
 from lgvi_warp.common.doors import names_in_stub
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Steady motions, linear models of a period, and how far a loop is from the edge."""
+"""Steady motions, linear models of one control period, and stability margins of a control loop."""
 
 from lgvi_warp.common.doors import names_in_stub
 

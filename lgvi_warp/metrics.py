@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Metrics of a control loop, one number of each member, and the risk of a fleet's numbers."""
+"""Metrics of a control loop, one number for each member, and risk measures of a fleet's numbers."""
 
 from lgvi_warp.common.doors import names_in_stub
 

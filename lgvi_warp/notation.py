@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Conversion between the user's notation and axes (Fossen's) and the paper's: momenta, principal axes, attitudes.
+"""Conversions between the user's notation (Fossen's) and the paper's: momenta, principal axes, attitudes.
 
 velocity = nu, angular_velocity = Om, position = b, attitude = R (body to inertial); p = M nu, pi = J Om.
-Every function accepts any leading dimensions; matrices and vectors of a leading dimension 1 are shared.
+Every function accepts any leading dimensions; a leading dimension of 1 is broadcast.
 """
 
 from lgvi_warp.common.doors import names_in_stub

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Studies over many runs: cost against accuracy, suggested settings, stability maps and sensitivity."""
+"""Studies with many runs: cost against accuracy, suggested settings, stability maps and sensitivity."""
 
 from lgvi_warp.common.doors import names_in_stub
 

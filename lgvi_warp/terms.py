@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Forces and other terms of a scene: what acts on a vehicle, for `Scene(terms=[...])`."""
+"""Forces and other terms that act on a vehicle, for `Scene(terms=[...])`."""
 
 from lgvi_warp.common.doors import names_in_stub
 

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Accuracy of methods (how accurate): trade-off, suggested settings, stability maps."""
+"""Accuracy of the integration methods: trade-off, suggested settings, stability maps."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The cheapest setting that keeps a given error: searched on a sample, checked on more members and after the run."""
+"""The cheapest setting that keeps a given error: found on a sample, checked on more members and after the run."""
 
 from __future__ import annotations
 
@@ -69,27 +69,27 @@ TIMED_MEMBERS = 256
 
 @dataclass(frozen=True)
 class Suggestion:
-    """Cheapest setting found for an error, with what it is predicted to cost.
+    """Cheapest setting found for an error, with its predicted cost.
 
     Attributes:
         settings: arguments for `lw.solve(fleet, **settings)`: method, h and dtype.
-        setting: the same as a Candidate.
+        setting: the same setting as a Candidate.
         error: requested error [`unit`].
-        of: name of the quantity that the error is of.
+        of: name of the quantity whose error is limited.
         unit: unit of that quantity.
-        expected: largest error over members and path: that of the checked members, extrapolated to the size of the fleet by
-            the tail of the largest errors; one in ten fleets of this size and distribution exceeds it [`unit`].
+        expected: largest error over members and path [`unit`]: the largest error of the checked members, extrapolated to
+            the size of the fleet by the tail of their errors. One in ten fleets of this size and distribution exceeds it.
         us_per_vehicle_second: microseconds of one core per vehicle and simulated second.
         run_seconds: predicted run time of all members on `threads` threads, without compiling [s].
         threads: threads that `run_seconds` assumes.
-        memory_bytes: predicted memory of the run and its result [bytes].
+        memory_bytes: predicted memory of the run and of its result [bytes].
         members: number of members that the setting was checked on.
-        t1: end time that was checked [s].
-        reference: the pair of runs that errors were measured against, in words.
+        t1: end time of the checked runs [s].
+        reference: description of the two runs that are the reference of the errors.
         reference_error: largest difference between these two runs [`unit`].
-        rivals: (setting, us_per_vehicle_second, error) of the next best settings.
-        worst: indices of the members with the largest errors, the largest first; `verified` runs them again.
-        asked: the quantity itself, for `verified`.
+        rivals: (setting, us_per_vehicle_second, error) of each of the next best settings.
+        worst: indices of the members with the largest errors, the largest first; a later check runs them again.
+        asked: the quantity itself, for that check.
         messages: notes for the user.
     """
 
@@ -114,12 +114,12 @@ class Suggestion:
 
     @property
     def margin(self) -> float:
-        """Factor by which the expected error is below the error asked for; infinite without any error."""
+        """Factor by which the expected error is below the requested error; infinite if the expected error is 0."""
         return self.error / self.expected if self.expected > 0.0 else math.inf
 
     @property
     def answer(self) -> str:
-        """The answer in one sentence; `str` ends with it."""
+        """The answer in one sentence; the text of `str` ends with it."""
         s, asked, expected = self.setting, *(few_digits(each, self.unit, 2) for each in (self.error, self.expected))
         chosen = f"{s.text} with step {s.h:.6g} s is the cheapest setting found"
         return f"{chosen} that keeps {self.of} to {asked} up to {self.t1:g} s: {expected} is expected."
@@ -153,32 +153,31 @@ def suggest(
 ) -> Suggestion:
     """Find the cheapest method, step and precision that keep a requested error for every member up to a time.
 
-    The search runs a sample of members; its best settings are then checked on up to 1024 members. A Pareto tail extrapolates
-    their largest errors to the size of the fleet; the step is shortened where that is too large. Where noise acts, all
-    runs of the search see one path of it, drawn every noise_step of the scene or, without one, finer than any step that is
-    tried; a run of the setting draws at its own steps.
+    The search runs a sample of members; its best settings are then checked on up to 1024 members. A Pareto tail
+    extrapolates their largest errors to the size of the fleet; if the result is too large, the step is shortened. If
+    noise acts, all runs of the search share one noise path. It is drawn every noise_step of the scene or, without a
+    noise_step, more finely than any step that is tried. A later run with the setting draws noise at its own steps.
 
     Args:
         fleet: the ensemble, or a Scene with one.
-        error: largest error allowed, over members and path, in the unit of `of`; above 0. Default 1e-3.
-        of: quantity whose error is limited: any that statistics know, such as "position" [m], "attitude" [rad], "depth"
-            [m], "position[2]" [m], "speed" [m/s] or "energy" [J], or a lw.statistics.Quantity; or the mean of a number,
-            such as "mean position[0]", whose bias at the end is reported with its interval, as by `lw.estimate`. Default
-            "position".
+        error: largest allowed error over all members and times, in the unit of `of`; above 0. Default 1e-3.
+        of: quantity whose error is limited: a name that statistics accept, such as "position" [m], "attitude" [rad],
+            "depth" [m], "position[2]" [m], "speed" [m/s] or "energy" [J]; or a lw.statistics.Quantity. Or a mean, such
+            as "mean position[0]": then its bias at the end is limited, and reported with its interval as by
+            `lw.estimate`. Default "position".
         t1: end time [s]. Default: run.duration of the scene.
-        methods: names of the methods to try. Default: a few by what acts in the scene, the others where these fail.
-        members: size of the sample that is searched. Default 128.
-        threads: threads of the predicted run. Default: those of this machine.
-        seconds: processor time of the search, about and without compiling [s]. Default 30.
-        progress: True shows a bar or lines, as in lw.solve; a function is called with the fraction of the work that is done,
-            from 0 to 1.
+        methods: names of the methods to try. Default: a few that suit the terms of the scene; if these fail, the others.
+        members: number of members in the sample that the search runs. Default 128.
+        threads: number of threads of the predicted run. Default: all threads of this machine.
+        seconds: approximate processor time of the search, without compiling [s]. Default 30.
+        progress: True shows a bar or lines, as in lw.solve; a function is called with the completed fraction, from 0 to 1.
 
     Returns:
         The cheapest setting, its expected error, its predicted time and memory, and the next best settings.
 
     Raises:
-        SceneError: for faulty arguments, all in one message; if noise acts that is no NoisyTerm; and if no reference is ten
-            times better than the error: the message has the time up to which one is.
+        SceneError: if arguments are faulty (one message lists all), if noise acts that is not a NoisyTerm, or if no
+            reference is ten times more accurate than the error. The message then gives the time up to which it is.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -208,7 +207,7 @@ def suggestion_on(
     report: Callable[[float], None], named: bool, *, threads: int | None = None,
     make_reference: Callable[..., Reference] = make_reference,
 ) -> Suggestion:  # fmt: skip
-    """Search a sample for the cheapest setting, as `suggest` says; named: whether the methods were asked for by name."""
+    """Search a sample for the cheapest setting, as `suggest` says; named: True if the user named the methods."""
     taken, refused = sample.accepted(names)
     if not taken:
         raise SceneError([f"method {name}: {why}" for name, why in refused.items()])
@@ -264,7 +263,7 @@ def suggestion_on(
 
 
 def redrawn(fleet: Ensemble) -> bool:
-    """Whether other members can be drawn from what varies in a fleet."""
+    """True if other members can be drawn from the distributions of a fleet."""
     try:
         drawn(fleet)
     except SceneError:
@@ -316,7 +315,7 @@ def searched(
     ladders: Ladders, taken: Sequence[str], compared: Distance, error: float, seconds: float,
     report: Callable[[float], None],
 ) -> list[Candidate]:  # fmt: skip
-    """The cheapest settings of a sample that keep the target: of the short list, and of all methods where these fail."""
+    """Cheapest settings that keep the target on a sample: from the short list or, if that fails, from all methods."""
     few = list(taken) if ladders.named else short_list(ladders.sample, taken)
     ladders.climb(few, lambda part: report(0.3 + 0.4 * part))
     if not ladders.named:
@@ -334,9 +333,9 @@ def searched(
 
 
 def checked(candidates: Sequence[Candidate], reference: Reference, of: str, error: float) -> list[tuple[Trial, float]]:
-    """Settings that keep the error on the reference's sample, their steps shortened for that, with the error expected.
+    """Settings that keep the error on the reference's sample, with shortened steps if needed, and the errors expected.
 
-    Where none does, the first one.
+    If no setting keeps it, the first setting is returned.
     """
     sample = reference.sample
 
@@ -362,10 +361,10 @@ def worst_of(trial: Trial, reference: Reference, of: str, members: int = CONFIRM
 
 
 def largest_in_fleet(errors: np.ndarray, members: int) -> float:
-    """Carry the largest error of some members, drawn as those of the fleet are, on to a fleet.
+    """Extrapolate the largest error of a sample of the fleet to the whole fleet.
 
-    The largest ones fall off as a power of their rank (Hill 1975), which gives the error that a fleet exceeds with a chance of
-    CHANCE (Weissman 1978). Tails that end are fallen off faster: for them it is too large, never too small.
+    The largest errors fall as a power of their rank (Hill 1975). This gives the error that a fleet exceeds with
+    probability CHANCE (Weissman 1978). A bounded tail falls faster: then the result is too large, never too small.
     """
     n = len(errors)
     falling = np.sort(errors)[::-1]
@@ -380,7 +379,7 @@ def checked_reference(
     sample: Sample, of: Distance, error: float, seconds: float, taken: Sequence[str], *,
     make_reference: Callable[..., Reference] = make_reference, grown: Callable[..., Growth] = growth_of,
 ) -> Reference:  # fmt: skip
-    """Make a reference that is ten times better than the error up to the end; SceneError where there is none."""
+    """Make a reference that is ten times more accurate than the error up to the end; SceneError if none is found."""
     reference = make_reference(sample, of, goal=error / 30.0, seconds=SHARE * seconds)
     apart = reference.error(of.name)
     if apart <= 0.1 * error:
@@ -403,7 +402,7 @@ def checked_reference(
 
 
 def short_list(sample: Sample, taken: Sequence[str]) -> list[str]:
-    """The methods to try first, by what acts in the scene."""
+    """The methods to try first, chosen by the terms of the scene."""
     if sample.noise(taken[0]) != "none":
         names = SHORT["noisy"]
     elif not is_damped(sample.ensemble):
@@ -416,7 +415,7 @@ def short_list(sample: Sample, taken: Sequence[str]) -> list[str]:
 
 
 def times_to_check(sample: Sample, candidates: Sequence[Candidate]) -> int:
-    """By how much the times of comparison may grow in number for the steps of some settings: 1 where noise acts."""
+    """Factor by which some settings allow more times of comparison; 1 if noise acts."""
     steps = [round(float(sample.spacing) / candidate.h) for candidate in candidates]
     grid = sample.draws or sample.fixed_draws
     allowed = [n for n in range(1, DENSER + 1) if not grid and all(n * -(-m // n) <= SHORTER * m for m in steps)]
@@ -426,9 +425,9 @@ def times_to_check(sample: Sample, candidates: Sequence[Candidate]) -> int:
 def refined(
     sample: Sample, candidate: Candidate, reference: Reference, of: str, target: float, members: int
 ) -> tuple[Trial, float]:
-    """Run a setting on a sample and shorten its step until a whole fleet keeps the target, at most six times.
+    """Run a setting on a sample; shorten its step up to six times, until the extrapolated error keeps the target.
 
-    Returns: The last trial, and the largest error expected in the fleet.
+    Returns: The last trial, and the expected largest error in the fleet.
     """
     m = sample.allowed(math.ceil(float(sample.spacing) / candidate.h * (1.0 - 1e-9)))
     order = 1 if sample.draws else Method(candidate.method).order
@@ -446,7 +445,7 @@ def seconds_of(
     fleet: Ensemble, candidate: Candidate, t1: float, *, kernels: Kernels = KERNELS,
     timed: Callable[..., np.ndarray] = cost.timed,
 ) -> float:  # fmt: skip
-    """Predict the CPU time of a run of all members from that of a few, with the scene's samples and without compiling [s]."""
+    """Predict the CPU time of a run of all members from a run of a few: samples included, compiling excluded [s]."""
     n = min(TIMED_MEMBERS, fleet.members)
     plan = make_plan(fleet.subset(range(n)), candidate.resolved(), candidate.h, t1, dtype=candidate.dtype)
     kernels.compile(plan)
@@ -454,7 +453,7 @@ def seconds_of(
 
 
 def memory_of(fleet: Ensemble, candidate: Candidate, t1: float) -> int:
-    """Predict the memory of a run of all members, with the scene's samples [bytes]."""
+    """Predict the memory of a run of all members, including the scene's samples [bytes]."""
     grid = make_plan(fleet.subset([0]), candidate.resolved(), candidate.h, t1, dtype=candidate.dtype).grid
     a_sample = 18 * np.dtype(machine.DTYPES[candidate.dtype]).itemsize
     return fleet.members * (len(grid.times) * a_sample + BYTES_OF_A_MEMBER)
@@ -465,9 +464,10 @@ def verified(
 ) -> tuple[float, int]:
     """Measure the error of a finished run by running some of its members again with half the step.
 
-    The members are those with the largest errors in the search, then the first ones. At half the step a method of order p is
-    2^p times better, so the difference is the error but for one part in 2^p. In noise both steps see one path, drawn at
-    each shorter one; errors are of order 1, and what each halving changes is independent, so that squares add up.
+    The members with the largest errors in the search are run first, then the first members. At half the step the error
+    of a method of order p is 2^p times smaller, so the difference is the error up to one part in 2^p. With noise both
+    runs share one path, drawn at each shorter step. Errors then have order 1, and the changes by successive halvings
+    are independent, so their squares add up.
 
     Returns: The largest error over these members and all samples, and how many members they are.
     """

@@ -47,14 +47,14 @@ class Measurement:
     Attributes:
         setting: method, step, precision and solver.
         us_per_vehicle_second: microseconds of one core per vehicle and simulated second, without compiling.
-        compile_seconds: time to load its kernel, once a process [s].
+        compile_seconds: time to load its kernel, spent once per process [s].
         errors: quantity -> {"end_max", "end_rms", "path_max", "path_rms"} over the members, in the units of
-            Tradeoff.units; empty where a member failed or noise acts.
-        energy_drift: largest |E(t) - E(0)| [J]; NaN where a force of the scene supplies or takes energy.
-        biases: difference of means and spreads in standard errors, by name, such as "position_mean".
+            Tradeoff.units; empty if a member failed or the errors of members cannot be measured.
+        energy_drift: largest |E(t) - E(0)| [J]; NaN if a force of the scene supplies or removes energy.
+        biases: name, such as "position_mean" -> difference of the statistic from the reference, in standard errors.
         order: order of the method.
-        trusted: quantity -> whether the error is at least ten times that of the reference.
-        cost_spread: median of the cost's readings over the least, which is taken.
+        trusted: quantity -> True if the error is at least ten times the error of the reference.
+        cost_spread: median of the readings of the cost divided by the smallest reading, which is the cost.
     """
 
     setting: Candidate
@@ -68,15 +68,15 @@ class Measurement:
     cost_spread: float = 1.0
 
     def error(self, of: str = "position", kind: str = "path_max") -> float:
-        """Give one error of this setting.
+        """Return one error of this setting.
 
         Args:
             of: name of the quantity. Default "position".
-            kind: "end_max", "end_rms", "path_max" or "path_rms": largest or root mean square of the members, at the end or
-                over the path. Default "path_max".
+            kind: "end_max", "end_rms", "path_max" or "path_rms": maximum or root mean square over the members, at the
+                end or over the path. Default "path_max".
 
         Returns:
-            The error, in the unit of the quantity; infinite where there is none.
+            The error, in the unit of the quantity; infinite if it was not measured.
         """
         return self.errors.get(of, {}).get(kind, math.inf)
 
@@ -86,19 +86,19 @@ class Tradeoff(Saved):
     """Measurements of settings on a sample of an ensemble, from 0 to t1.
 
     Attributes:
-        measurements: one for each setting that was run and did not fail.
-        of: name of the quantity that decides how far the reference is trusted.
+        measurements: one measurement for each setting that ran and did not fail.
+        of: name of the quantity that decides up to which time the reference is trusted.
         members: size of the sample.
-        t1: end time; biases are up to it [s].
-        until: time up to which the reference is trusted; errors of members are up to it [s].
-        reference: what errors are measured against, in words.
+        t1: end time; biases are measured up to it [s].
+        until: time up to which the reference is trusted; errors of members are measured up to it [s].
+        reference: description of the reference of the errors.
         reference_error: quantity -> the reference's own largest error up to `until`; empty where noise acts.
-        growth: how fast small differences grow; None where noise acts.
-        refused: method -> why the scene does not take it.
+        growth: growth of small differences between two starts; None where noise acts.
+        refused: method -> reason why it cannot run the scene.
         messages: notes for the user.
-        seconds: time that the measurement took [s].
+        seconds: duration of the measurement [s].
         units: quantity -> unit of its errors.
-        missing: method that was asked for by its name and has no measurement -> why.
+        missing: method that the user named but that has no measurement -> reason.
     """
 
     measurements: tuple[Measurement, ...]
@@ -136,7 +136,7 @@ class Tradeoff(Saved):
         )
 
     def _text(self, measured: Measurement) -> str:
-        """A setting with its error and its cost."""
+        """Text of a setting with its error and its cost."""
         s, unit = measured.setting, self.units[self.of]
         error, price = few_digits(measured.error(self.of), unit, 2), measured.us_per_vehicle_second
         return f"{s.text} at {s.h:.4g} s ({error}, {price:.3g} us/vehicle/s)"
@@ -155,7 +155,7 @@ class Tradeoff(Saved):
             Measurements in order of rising cost.
 
         Raises:
-            SceneError: if the trade-off has no such quantity or kind.
+            SceneError: if the trade-off has no errors of this quantity or kind.
         """
         of, faults = self.of if of is None else of, Faults()
         faults.choice("of", of, (self.of, *self.units))
@@ -165,7 +165,7 @@ class Tradeoff(Saved):
         return sorted(good, key=lambda measurement: measurement.us_per_vehicle_second)
 
     def front(self, of: str | None = None, kind: str = "path_max") -> list[Measurement]:
-        """List the measurements on the Pareto front: each is more accurate than all cheaper ones.
+        """List the measurements on the Pareto front: each is more accurate than all cheaper measurements.
 
         Args:
             of: name of the quantity. Default: that of the trade-off.
@@ -247,31 +247,30 @@ def tradeoff(
 ) -> Tradeoff:
     """Measure cost and error of methods, steps, precisions and solvers on the first members of a fleet.
 
-    The cost of a step is CPU time of the thread that runs it: the least of several readings, one number for all steps
-    of a method. Readings that disagree are reported in the messages. Errors are measured against a reference that two
-    independent runs agree on to a tenth of the smallest error shown. Where noise acts, all runs see one path of it, drawn
-    every noise_step of the scene or, without one, finer than any step that is tried; if no path can be shared, or it is too
-    rough for errors of members, statistics are compared with those of the finest run.
+    The cost of a step is the CPU time of the thread that runs it: the smallest of several readings, one number for all
+    step lengths of a method. The messages report readings that disagree. The reference of the errors is two independent
+    runs that agree to a tenth of the smallest error shown. If noise acts, all runs share one noise path. It is drawn
+    every noise_step of the scene or, without a noise_step, more finely than any step that is tried. If no path can be
+    shared, or it is too rough for errors of members, statistics are compared with those of the finest run.
 
     Args:
         fleet: the ensemble, or a Scene with one.
         t1: end time [s]. Default: run.duration of the scene.
-        of: quantity by whose error the reference is accepted: any that statistics know ("position", "attitude",
-            "depth", "position[2]", "speed", "euler", ...), or a lw.statistics.Quantity. Errors of position, attitude,
-            velocity, angular_velocity and energy are measured as well. Default "position".
-        methods: names of the methods to try; each has a setting measured, or is named in `missing`. Default: all that the
-            scene takes.
-        members: size of the sample. Default 128.
-        seconds: processor time to spend [s]: kernels that are compiled may take as much again. One coarse setting of every
-            method comes first, then each step is halved in turn; the messages list what is left out. Default 45.
-        progress: True shows a bar or lines, as in lw.solve; a function is called with the fraction of the work that is done,
-            from 0 to 1.
+        of: quantity whose error decides whether the reference is accepted: a name that statistics accept ("position",
+            "attitude", "depth", "position[2]", "speed", "euler", ...), or a lw.statistics.Quantity. Errors of position,
+            attitude, velocity, angular_velocity and energy are always measured. Default "position".
+        methods: names of the methods to try. `missing` lists methods without any measurement. Default: all that fit the
+            scene.
+        members: number of members in the sample. Default 128.
+        seconds: processor time to spend [s]; compiling kernels may take as much again. Every method first runs one
+            coarse setting; then each step is halved in turn. The messages list what is left out. Default 45.
+        progress: True shows a bar or lines, as in lw.solve; a function is called with the completed fraction, from 0 to 1.
 
     Returns:
         Measurements of every setting, with their Pareto front.
 
     Raises:
-        SceneError: for faulty arguments, all in one message; and where no reference can be found.
+        SceneError: if arguments are faulty (one message lists all), or if no reference can be found.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -295,7 +294,7 @@ def tradeoff_on(
     named: bool, *, make_reference: Callable[..., Reference] = make_reference,
     grown: Callable[..., Growth] | None = None,
 ) -> Tradeoff:  # fmt: skip
-    """Measure methods on a sample, as `tradeoff` says; named: whether they were asked for by name."""
+    """Measure methods on a sample, as `tradeoff` says; named: True if the user named them."""
     begun, whole = time.perf_counter(), Budget(seconds)
     taken, refused = sample.accepted(names)
     if not taken:
@@ -354,7 +353,7 @@ def without_reading(
     names: Sequence[str], trials: Sequence[Trial], measured: Sequence[Measurement], refused: dict[str, str],
     seconds: float,
 ) -> dict[str, str]:  # fmt: skip
-    """The methods that were asked for and have no measurement, and why."""
+    """The methods that the user named but that have no measurement, and the reasons."""
 
     def why(name: str) -> str:
         least = min(trial.candidate.h for trial in trials if trial.candidate.method == name)
@@ -369,7 +368,7 @@ def without_reading(
 def growth_of(
     sample: Sample, taken: Sequence[str], reference: Reference, *, measure: Callable[..., Growth] = measured_growth
 ) -> Growth:
-    """Measure how errors grow, by the method of highest order at about the reference's step."""
+    """Measure the growth of errors by the method of highest order, at about the reference's step."""
     method = max(taken, key=lambda name: Method(name).order)
     often = sample if sample.draws else Sample(sample.whole, sample.t1, sample.members, kernels=sample.kernels)
     m = max(1, round(float(often.spacing) / reference.result.provenance["step"]))
@@ -388,9 +387,9 @@ def reaches_nothing(reference: Reference, of: Distance) -> bool:
 
 
 def trusted_until(reference: Reference, of: Distance, seconds: float) -> int:
-    """Index of the last sample at which errors below 1e-2 can be measured; SceneError without one.
+    """Index of the last sample at which errors below 1e-2 can be measured; SceneError if there is none.
 
-    seconds: of the whole trade-off, for the message [s].
+    seconds: time budget of the whole trade-off, for the message [s].
     """
     until = reference.reaches(of.name, LOST / (TRUST * TRUST))
     if reaches_nothing(reference, of):
@@ -408,7 +407,7 @@ def measurements(
     sample: Sample, trials: Sequence[Trial], reference: Reference | None, finest: Result, until: int,
     distance: Distance | None = None,
 ) -> list[Measurement]:  # fmt: skip
-    """Cost, errors, drifts and biases of the trials that did not fail; without a reference, no errors."""
+    """Cost, errors, drifts and biases of the trials that did not fail. Without a reference there are no errors."""
     good = [trial for trial in trials if not comparison.failed(trial.result) and (trial.errors or reference is None)]
     compiled: dict[tuple[str, str], float] = {}
     for trial in trials:
@@ -438,7 +437,7 @@ def measurements(
 
 
 def report_lines(tradeoff: Tradeoff) -> list[str]:
-    """The trade-off as lines of text."""
+    """Report of the trade-off as lines of text."""
     unit = tradeoff.units[tradeoff.of]
     lines = [f"missing     {name}: {why}" for name, why in tradeoff.missing.items()]
     lines += [f"note        {message}" for message in tradeoff.messages]
@@ -485,7 +484,7 @@ def growth_text(growth: Growth) -> str:
 def bias_lines(tradeoff: Tradeoff) -> list[str]:
     """A table of the statistics' biases against the step.
 
-    It is of one method in float64 with the default solver: the first of order 2, or of the order nearest to it.
+    The table is for one method in float64 with the default solver: the first method whose order is 2 or nearest to 2.
     """
     double = [entry for entry in tradeoff.measurements
               if entry.biases and entry.setting.dtype == "float64" and entry.setting.plain]  # fmt: skip

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""An altimeter: how far the sea floor is along a beam."""
+"""An altimeter: the range to the sea floor along a beam."""
 
 from __future__ import annotations
 
@@ -19,28 +19,28 @@ from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, 
 class Altimeter(Sensor):
     """A sensor of the range to the scene's floor along a beam of the body, with the errors of any `Sensor`.
 
-    Readings range from 0, on the floor or below it, to `most`, if no floor is within reach. They follow from the true
-    position and attitude, whatever other sensors read.
+    A reading is 0 on the floor or below it, and `most` if no floor is within range. It is computed from the true
+    position and attitude, not from the readings of other sensors.
 
     Args:
         direction: Direction of the beam in body axes, (3,) of any length; (0, 0, 1) by default, down.
-        point: Where the beam begins, (3,) [m] in body axes; zeros by default.
-        most: Its reach [m]; 100 by default.
+        point: Point at which the beam begins, (3,) [m] in body axes; zeros by default.
+        most: Largest range of the beam [m]; 100 by default.
         floor: Name of the floor; "" by default, for the only one of the scene.
         noise: Standard deviation of each reading [m]; 0 by default.
-        bias: Added to each reading [m]; 0 by default.
-        drift: Random walk: its standard deviation after 1 s [m / s^1/2]; 0 by default.
-        quantum: Readings are rounded to whole multiples of this [m]; 0 by default, not at all.
+        bias: Constant error added to each reading [m]; 0 by default.
+        drift: Standard deviation of the random walk after 1 s [m / s^1/2]; 0 by default.
+        quantum: Readings are rounded to whole multiples of this length [m]; 0 by default, for no rounding.
         every: Ticks from one new reading to the next, a whole number; 1 by default.
         latency: Ticks until a reading arrives, a whole number; 0 by default.
-        dropout: Probability with which a reading is lost, so that the last one is kept; 0 by default.
+        dropout: Probability that a reading is lost, so that the last reading is kept; 0 by default.
         burst: Mean length of a run of lost readings [ticks]; by default losses are independent.
-        outlier: Probability with which a reading is an outlier; by default none is.
-        outlier_std: Standard deviation of what an outlier adds to the reading [m].
+        outlier: Probability that a reading is an outlier; by default there are no outliers.
+        outlier_std: Standard deviation of the error that an outlier adds to the reading [m].
 
     Raises:
-        SceneError: If the beam has no direction; and as `Sensor`. A scene refuses it if it has no floor, or several of
-            which none is named.
+        SceneError: If `direction` has length 0, or for a reason listed at `Sensor`. A scene refuses an altimeter if it
+            has no floor, or if it has several floors and `floor` names none of them.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -93,5 +93,5 @@ class Altimeter(Sensor):
 
 
 def unit(direction: np.ndarray) -> np.ndarray:
-    """Directions (n, 3) of length 1."""
+    """Directions (n, 3), scaled to length 1."""
     return np.asarray(direction / np.linalg.norm(direction, axis=-1, keepdims=True))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The base classes of a controller's parts: numbers as those of terms, and where each part finds what others write."""
+"""Base classes of a controller's parts, whose numbers are declared as in terms, and the rows of memory that parts share."""
 
 from __future__ import annotations
 
@@ -52,18 +52,18 @@ READINGS = {
 
 
 class Bus(NamedTuple):
-    """The first rows of the memory, by which parts hand numbers on: {actuator: (first row, channels)} and single rows.
+    """Rows of the memory through which parts exchange numbers; `commands` is {actuator: (first row, channels)}.
 
-    handed: First rows of what sensors hand to an estimator, by their keys; belief: first row of what the estimator believes.
-    acting: First row of the commands that act, where commands are delayed. As many rows of the commands before follow, and the
-        row of the step from which the former act. period: Time between two ticks [s]. ranges: Row of each altimeter's reading.
-    rejected: First of the rows with the counts of readings that an estimator's gate rejects; -1 where none has a gate.
-    diverged: Row of the number of ticks at which an estimator's error was far beyond what it believes, the last but one of
-        those of what it believes; the row behind it as that of `unconverged`. -1 where no estimator reports.
-    unconverged: Row of the number of solutions by iterations that had not converged at their tick; the row behind it holds the
-        time of the first one, a period later [s]. -1 where no part iterates.
-    done: First of two rows of each part at which an event looks, by its key. Of guidance: 1 once it is done, and since when
-        [s]; of an estimator: the standard deviation of its position [m], and the time of that tick [s].
+    handed: First row of the readings that each sensor passes to an estimator, by key. belief: First row of the estimator.
+    acting: First row of the commands in effect, if commands are delayed. As many rows of the previous commands follow, then
+        the row of the step at which the new ones take effect. period: Time between two ticks [s]. ranges: Row of each
+        altimeter's reading. rejected: First row of the counts of readings that an estimator's gate rejects; -1 without a gate.
+    diverged: Row of the number of ticks at which an estimator's error was far larger than its own covariance predicts. It is
+        the last row but one of the estimator; the next row is as for `unconverged`. -1 if no estimator reports this.
+    unconverged: Row of the number of iterative solutions that had not converged at their tick. The next row holds the time
+        of the first of them plus one period [s]. -1 if no part iterates.
+    done: First of two rows of each part that an event watches, by key. For guidance: 1 once it is done, and the time since
+        then [s]; for an estimator: the standard deviation of its position [m], and the time of that tick [s].
     """
 
     commands: Mapping[str, tuple[int, int]]
@@ -84,7 +84,7 @@ class Bus(NamedTuple):
 
     @property
     def channels(self) -> int:
-        """Number of commands of all actuators together."""
+        """Total number of commands of all actuators."""
         return self.unmet
 
     @classmethod
@@ -100,11 +100,12 @@ class Bus(NamedTuple):
         iterates: bool = False,
         ending: Sequence[str] = (),
     ) -> Bus:
-        """The bus of some actuators, with a time between two ticks [s].
+        """The bus of some actuators.
 
-        channels: Commands of each. answers: Rows for answers of the host. altimeters: Their keys. handed: Rows that sensors
-            hand to an estimator, by their keys; belief: rows of what it believes, of which `rejected` are counts of what its
-            gate rejects. iterates: Whether a part does. ending: Keys of the parts at which an event looks.
+        channels: Number of commands of each actuator, by key. period: Time between two ticks [s]. answers: Number of rows for
+            answers of the host. altimeters: Keys of altimeters. handed: Number of rows that each sensor passes to an
+            estimator, by key. belief: Number of rows of the estimator, of which `rejected` are counts of rejected readings.
+            iterates: Whether some part iterates. ending: Keys of the parts that an event watches.
         """
         commands, row = {}, 0
         for key, count in channels.items():
@@ -137,17 +138,17 @@ class Bus(NamedTuple):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Part(Term):
-    """A part of a controller: a term in all but the list that it stands in.
+    """Base class of a controller's parts. A part is defined like a term, but it is listed in the controller.
 
     Args:
         name: Name of the part in parameters ("name.field"); by default its type.
 
     Attributes:
-        section: List of the controller in which it stands.
+        section: List of the controller in which the part is given, such as "laws".
         device: As in `Term`; the module is one of lgvi_kernels.laws.control.
-        needs: What it reads of the wanted motion, among `WISHES`.
-        gives: What it wants of the motion, among `WISHES`.
-        bus: Where it finds the numbers of other parts.
+        needs: Quantities of the wanted motion that the part reads, among `WISHES`.
+        gives: Quantities of the wanted motion that the part sets, among `WISHES`.
+        bus: Rows of the memory in which the part finds the numbers of other parts.
     """
 
     acts: ClassVar[bool] = False
@@ -165,24 +166,24 @@ class Part(Term):
 
     @property
     def gives(self) -> tuple[str, ...]:
-        """Quantities that it wants of the motion, among `WISHES`; by default nothing."""
+        """Quantities of the wanted motion that the part sets, among `WISHES`; by default none."""
         return ()
 
     @property
     def ends(self) -> str:
-        """Type of the event that may look at it, in the rows `bus.done`; by default "", none."""
+        """Type of the event that may watch this part, in the rows `bus.done`; by default "", for none."""
         return ""
 
     @property
     def ticks_before(self) -> int:
-        """Number of ticks that it must have had before a time at which a member starts anew beside others; by default 0."""
+        """Number of ticks that the part needs before a time at which copies of a member are started; by default 0."""
         return 0
 
     def features(self, numbers: Numbers) -> tuple[str, ...]:
-        """Say what its device code must have for these numbers.
+        """Features of the device code that these numbers require.
 
         Args:
-            numbers: Numbers of its fields by name, of all members, each (n, ...).
+            numbers: Numbers of the part's fields by name, of all members, each (n, ...).
 
         Returns:
             Words among `every_feature`; by default none.
@@ -190,13 +191,13 @@ class Part(Term):
         return ()
 
     def with_features(self, known: frozenset[str]) -> Any:
-        """Choose the device code for what some member of a run needs.
+        """Select the features of the device code that some member of a run requires.
 
         Args:
-            known: Words "key.feature" of all parts.
+            known: Required features of all parts, as "key.feature".
 
         Returns:
-            A copy.
+            A copy of the part with these features.
         """
         part = copy.copy(self)
         chosen = tuple(word for word in self.every_feature if f"{self.key}.{word}" in known)
@@ -204,34 +205,34 @@ class Part(Term):
         return part
 
     def in_scene(self, faults: Faults, events: Sequence[Term], sensors: Sequence[Any]) -> Any:
-        """Tell the part what it needs to know of the scene's events and of the sensors.
+        """Give the part the events and sensors that it uses.
 
         Args:
-            faults: Collects the faults of what is missing.
+            faults: Collects a fault for each thing that is missing.
             events: Events of the scene.
-            sensors: Sensors of the controller, each of which knows the scene.
+            sensors: Sensors of the controller, which already know the scene.
 
         Returns:
-            A copy, or the part where it needs nothing; by default the latter.
+            A copy that knows them, or the part itself if it uses none, which is the default.
         """
         return self
 
     def located(self, plane: LocalPlane | None) -> Any:
-        """Convert the places on the Earth that the part has, if it has any, to positions.
+        """Convert the part's geodetic points, if it has any, to positions in inertial axes.
 
         Args:
-            plane: The plane of the scene's inertial axes on the Earth; None where the scene has no origin.
+            plane: The plane of the scene's inertial axes on the Earth; None if the scene has no origin.
 
         Returns:
-            By default the part itself.
+            A copy with positions; by default the part itself.
 
         Raises:
-            SceneError: If the part has places, and the scene no origin.
+            SceneError: If the part has geodetic points and the scene has no origin.
         """
         return self
 
     def wired(self, bus: Bus, others: Mapping[str, Term]) -> Any:
-        """Tell the part where it finds what others write.
+        """Give the part the rows of memory that other parts write.
 
         Args:
             bus: Rows of the controller's memory.
@@ -255,7 +256,7 @@ class Part(Term):
         return Packed(values | self.words(), memory=self.first_memory)
 
     def words(self) -> dict[str, Any]:
-        """Return the fields of the device struct beside the numbers; by default there are none."""
+        """Return the fields of the device struct other than the part's numbers; by default there are none."""
         return {}
 
 
@@ -263,17 +264,17 @@ AnyPart = TypeVar("AnyPart", bound=Part)
 
 
 def _built_in(section: str, *words: str) -> registry.Kinds:
-    """The parts of these types in a list of a controller, each in the file of its name."""
+    """The types of parts that a list of a controller may hold; each type has a file of its name."""
     return registry.Kinds("lgvi_warp.control", {word: [word] for word in words}, section)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class MeasuringPart(Part):
-    """A sensor or an estimator: changes the measured motion that the controller uses.
+    """Base class of sensors and estimators, which change the measured motion that the controller uses.
 
     Attributes:
-        uses: Keys of the sensors that hand their readings to this estimator alone, by what they are to it.
-        linear: Whether linear models of a loop may have it.
+        uses: {role: key} of the sensors that pass their readings to this estimator only.
+        linear: Whether linear models of a control loop may contain this part.
     """
 
     section: ClassVar[str] = "sensors"
@@ -298,30 +299,30 @@ class MeasuringPart(Part):
 
     @property
     def estimates_position(self) -> bool:
-        """Whether it changes the measured position, whose difference from the true one is then the navigation error."""
+        """Whether the part changes the measured position. The measured minus the true position is the navigation error."""
         return False
 
     @property
     def uses(self) -> Mapping[str, str]:
-        """Keys of the sensors that hand their readings to this estimator alone, by what they are to it; by default none."""
+        """{role: key} of the sensors that pass their readings to this estimator only; by default none."""
         return {}
 
     @property
     def handed_rows(self) -> int:
-        """Numbers that it hands to an estimator at a tick; 0, the default, for a part that can hand on nothing."""
+        """Count of numbers that the part passes to an estimator at a tick; 0, the default, if it can pass none."""
         return 0
 
     def fault_channels(self, handed: bool) -> int:
-        """Count of numbers that faults can change; by default that of `reading`, 0 where it reads nothing.
+        """Count of numbers that faults can change; by default the size of the reading, 0 for a part without a reading.
 
         Args:
-            handed: Whether an estimator takes its readings.
+            handed: Whether an estimator takes the part's readings.
         """
         return READINGS.get(self.reading, 0)
 
     @property
     def is_handed(self) -> bool:
-        """Whether an estimator of the scene takes its readings: then it leaves the measurement as it is."""
+        """Whether an estimator takes this part's readings. If so, the part does not change the measured motion itself."""
         return hasattr(self, "bus") and self.key in self.bus.handed
 
     def check_used(self, faults: Faults, sensors: Sequence[Any]) -> None:
@@ -329,16 +330,16 @@ class MeasuringPart(Part):
 
         Args:
             faults: Collects the faults.
-            sensors: All parts of the list, in their order.
+            sensors: All sensors and estimators of the controller, in their order.
         """
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Guidance(Part):
-    """Guidance: sets the wanted motion.
+    """Base class of guidance, which sets the wanted motion.
 
     Attributes:
-        wanted: The quantities of `gives` for which the user asked.
+        wanted: The quantities of `gives` that the user requested.
     """
 
     section: ClassVar[str] = "guidance"
@@ -351,16 +352,16 @@ class Guidance(Part):
 
     @property
     def wanted(self) -> tuple[str, ...]:
-        """The quantities of `gives` for which the user asked, so that some law should read them; by default all of them."""
+        """The quantities of `gives` that the user requested; some law should read each. By default all of `gives`."""
         return self.gives
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ControlLaw(Part):
-    """A law: the demand X, Y, Z [N] and K, M, N [N m] in the body's axes, from what is wanted and what is measured.
+    """Base class of control laws: the demand X, Y, Z [N] and K, M, N [N m] in body axes, from wanted and measured motion.
 
     Attributes:
-        demands: Components that it asks for, among `COMPONENTS`; none named: all of them.
+        demands: Components that the law demands, among `COMPONENTS`; an empty tuple stands for all of them.
     """
 
     section: ClassVar[str] = "laws"
@@ -388,7 +389,7 @@ class ControlLaw(Part):
 
     @property
     def foresees(self) -> bool:
-        """Whether it looks ahead at what guidance will want; by default False."""
+        """Whether the law uses future values of the wanted motion; by default False."""
         return False
 
     def __post_init__(self) -> None:
@@ -398,14 +399,14 @@ class ControlLaw(Part):
 
     @classmethod
     def device_fields(cls, name: str) -> tuple[str, ...]:
-        """Fields of the device struct that a number becomes, for tables of it over what is measured.
+        """Fields of the device struct that hold a number, so that the number can be a gain table.
 
         Args:
             name: Name of the number.
 
         Returns:
-            Names of fields; none, if the number can be no table. By default the number itself where the class does not define
-            `packed`.
+            Names of fields; empty if the number cannot be a table. By default the number's own name, if the class does not
+            define `packed`.
         """
         own = cls.packed is Part.packed and cls.lanes() is not None
         return tuple(item.name for item in cls.number_fields() if own and word_of(item) == name)
@@ -440,10 +441,10 @@ class ControlLaw(Part):
         return law
 
     def of_vehicle(self, nominal: Numbers) -> Any:
-        """The same law, knowing the vehicle that its author had in mind.
+        """The same law with the numbers of the scene's nominal vehicle, which do not vary by member.
 
         Args:
-            nominal: Parameters of vehicle and environment by name, each of the shape that the scene has.
+            nominal: Parameters of vehicle and environment by name, each with its shape in the scene.
 
         Returns:
             A copy.
@@ -454,7 +455,7 @@ class ControlLaw(Part):
 
 
 def list_of_names(faults: Faults, key: str, names: Any, known: Collection[str]) -> list[str]:
-    """Names of a list that are known and occur once; what is wrong with others is noted."""
+    """The known names of a list, each once. Adds a fault for every other entry."""
     listed = items_of(names)
     if not listed:
         faults.add(key, names, "is not a list of names", f"give some of {', '.join(known)}")
@@ -471,11 +472,11 @@ ANTI_WINDUP = ("conditional", "none")
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class IntegralLaw(ControlLaw):
-    """A law with integrals, each in two rows of the memory.
+    """Base class of laws with integrals; each integral has two rows of the memory.
 
     Args:
-        anti_windup: "conditional", the default: an integral stays as it is while the actuators do not deliver the demand and
-            its error would make this worse; or "none".
+        anti_windup: "conditional", the default: an integrator stops while the actuators do not deliver the demand and its
+            error would increase the shortfall; or "none".
     """
 
     # Rows of the memory, two of each integral's number; and what the device code calls several limits of integrals.
@@ -506,11 +507,11 @@ FEEDFORWARD = ("none", "restoring")
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PoseLaw(IntegralLaw):
-    """A law of position and attitude, each with an integral of three numbers.
+    """Base class of laws of position and attitude, each with an integral of three numbers.
 
     Args:
-        feedforward: "restoring": what balances weight, buoyancy and their moment at the measured attitude, by the numbers of
-            the scene, whatever a member's are: a controller does not know them; or "none", the default.
+        feedforward: "restoring" balances weight, buoyancy and their moment at the measured attitude. It uses the scene's
+            numbers for every member, since a controller does not know a member's own; or "none", the default.
     """
 
     needs: ClassVar[tuple[str, ...]] = ("position", "velocity", "attitude", "angular_velocity")
@@ -529,9 +530,9 @@ class PoseLaw(IntegralLaw):
 
 
 def restoring(nominal: Numbers) -> tuple[np.ndarray, np.ndarray]:
-    """Weight less buoyancy (1,) [N], downward, and the sum of both times their points (1, 3) [N m], body axes, of a scene.
+    """Weight minus buoyancy (1,) [N] of a scene, and weight times its point minus buoyancy times its point (1, 3) [N m].
 
-    The cross product of the latter with the direction downward is the moment.
+    The points are in body axes. The cross product of the second result with the downward direction is the moment.
     """
     numbers = {name: np.asarray(value)[None] for name, value in nominal.items()}
     weight, buoyancy = vehicle.weight(numbers), numbers["vehicle.buoyancy"]
@@ -545,13 +546,13 @@ NEVER, SAME_TIME = 1e30, 1e-6
 
 
 def first_step(time: np.ndarray, h: float) -> np.ndarray:
-    """The first step at or after times [s] of any shape; `NEVER` for never."""
+    """Index of the first step at or after times [s] of any shape; `NEVER` for an infinite time."""
     return np.ceil(np.minimum(time / h, NEVER) - SAME_TIME)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Allocation(Part):
-    """Allocation: turns the demand into the commands of one term.
+    """Base class of allocations, which turn the demand into the commands of one term.
 
     Args:
         to: Key of the term that takes the commands.
@@ -560,7 +561,7 @@ class Allocation(Part):
         actuator: The term that takes the commands.
 
     Methods:
-        reach: The wrench of a unit of each command.
+        reach: The wrench of one unit of each command.
     """
 
     section: ClassVar[str] = "allocation"
@@ -580,11 +581,11 @@ class Allocation(Part):
         return part
 
     def informed(self, faults: Sequence[Any], components: np.ndarray) -> Any:
-        """The same part, knowing which channels are lost from some time on, and which components count.
+        """The same part with the known losses of channels and the demanded components.
 
         Args:
             faults: Faults of actuators.
-            components: 1 for each of X Y Z K M N that laws ask for, else 0, (6,).
+            components: 1 for each of X Y Z K M N that some law demands, else 0, (6,).
 
         Returns:
             A copy.
@@ -597,17 +598,17 @@ class Allocation(Part):
 
     @property
     def lost_channels(self) -> tuple[int, ...]:
-        """Numbers of the channels that are known to be lost at some time."""
+        """Indices of the channels that the allocation knows to be lost at some time."""
         return tuple(sorted({fault.channel for fault in self.losses}))
 
     def steps_of_loss(self, context: PackingContext) -> np.ndarray:
-        """The first step at which each channel is known to be lost.
+        """The first step at which the allocation knows each channel to be lost.
 
         Args:
             context: The scene's parameters and the step.
 
         Returns:
-            Numbers of steps (1 or n, channels); `NEVER` for a channel that is not.
+            Indices of steps (1 or n, channels); `NEVER` for a channel that is not lost.
         """
         times = [np.full((1, self.actuator.channels), NEVER)]
         for fault in self.losses:
@@ -618,17 +619,18 @@ class Allocation(Part):
         return np.asarray(functools.reduce(np.minimum, times))
 
     def check_actuator(self, faults: Faults) -> None:
-        """Add a fault for what does not fit the actuator.
+        """Add a fault for each setting that does not fit the actuator.
 
         Args:
             faults: Collects the faults.
         """
 
     def reach(self) -> np.ndarray:
-        """Wrench of each channel, of the scene's own numbers.
+        """Wrench of each channel, from the scene's numbers.
 
         Returns:
-            (6, channels) [N, N m], of any size. By default, for a part that does not know it, every component by itself.
+            Wrenches (6, channels) [N, N m]; only their directions count. By default the identity (6, 6): every component
+            can be produced independently.
         """
         return np.eye(6)
 
@@ -638,14 +640,14 @@ ROUND_OFF = 1e-12
 
 
 def rest_rows(reached: np.ndarray) -> np.ndarray:
-    """The projector onto the demands beside those reached (n, 6, 6), line by line (n, 36), without round-off."""
+    """The projector onto undelivered demands, I minus `reached` (n, 6, 6), line by line (n, 36), with round-off set to 0."""
     others = np.eye(6) - reached
     return np.where(np.abs(others) < ROUND_OFF, 0.0, others).reshape(len(others), -1)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Sending(Part):
-    """A part that changes commands on their way to the actuators."""
+    """Base class of parts that change commands on their way to the actuators."""
 
     section: ClassVar[str] = "faults"
     kinds: ClassVar[registry.Kinds] = _built_in("faults", "fault")

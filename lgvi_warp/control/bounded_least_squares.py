@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Allocation within the limits of the actuators: what one channel cannot make, others do."""
+"""Allocation within the limits of the actuators: when one channel is at its limit, others take over."""
 
 from __future__ import annotations
 
@@ -22,21 +22,21 @@ WORK = 138
 class BoundedLeastSquares(EffortAllocation):
     """Allocation by bounded least squares: efforts within limits, wrench nearest to the demand (Johansen & Fossen 2013, 2.2).
 
-    The error is the sum of (priority times component)^2, moments divided by the mean lever arm of the channels. If the
-    unconstrained efforts of least error are within the limits, they are used; they equal those of `PseudoInverse` if the
-    channels can produce every component independently. Otherwise an active-set method finds the efforts of least error, to
-    round-off. Channels that are known to be lost produce nothing, however many they are.
+    The error is the sum of (priority times component)^2, with moments divided by the mean lever arm of the channels. If
+    the unconstrained efforts of least error are within the limits, they are used. They equal the efforts of
+    `PseudoInverse` if the channels can produce every component independently. Otherwise an active-set method finds the
+    efforts of least error, to round-off. Channels that are known to be lost get no effort; any number may be lost.
 
     Args:
         to: Key of the term that takes the commands.
         weights: Cost of each effort, (channels,), above 0; 1 by default.
-        speed: Speed ahead [m/s] at which the effect of fins is evaluated; 1 by default. "measured": at each tick the
-            measured speed ahead, through the water, but at least `least_speed`.
-        least_speed: Least speed [m/s] at which it is evaluated if `speed` is "measured".
+        speed: Forward speed [m/s] at which the effect of fins is evaluated; 1 by default. "measured" uses, at each tick,
+            the measured forward speed through the water, but at least `least_speed`.
+        least_speed: Least speed [m/s] at which the effect of fins is evaluated if `speed` is "measured".
         priorities: Weights of errors in X, Y, Z, K, M, N, (6,), above 0; 1 by default. [1, 1, 1, 10, 10, 10] gives moments
             priority over forces.
-        iterations: Largest number of steps of the active-set method at a tick; 100 by default. A run says in its messages
-            where a tick had not converged.
+        iterations: Largest number of steps of the active-set method at a tick; 100 by default. The run's messages report
+            ticks at which the method had not converged.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -93,7 +93,7 @@ class BoundedLeastSquares(EffortAllocation):
         return Packed(words, side_by_side(*flat, curves), work=WORK + 8 * count)
 
     def _solution(self, B: np.ndarray, weights: np.ndarray, priorities: np.ndarray) -> np.ndarray:
-        """The efforts (n, channels, 6) of least error without limits: the pseudo-inverse, of prioritised rows that depend."""
+        """Map (n, channels, 6) from demand to the efforts of least error without limits: a prioritised pseudo-inverse."""
         lines = pseudo_inverse(B, weights, ())
         reached = np.einsum("nij,nji->ni", B, lines) > 1.0 - 1e-6
         spans = np.all(reached | ~np.any(B, axis=2), axis=1)

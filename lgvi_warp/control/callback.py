@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A law that is a Python function of all members of a block, called once a period."""
+"""A control law in Python: a function of all members of a block, called once a period."""
 
 from __future__ import annotations
 
@@ -20,20 +20,20 @@ REMEDY = "give lw.control.Callback(function) to lw.Controller in Python; lw.resu
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Callback(ControlLaw):
-    """A law in Python: `function(t, y, r, members)` returns the demand of all members of a block, (m, 6) [N, N m].
+    """A control law in Python: `function(t, y, r, members)` returns the demand of all members of a block, (m, 6) [N, N m].
 
-    t is the time of the tick [s]; y what is measured and r what is wanted, each with arrays of m members (see
-    `lw.control.CallbackInput`); members are their indices (m,). NumPy, PyTorch, JAX or any solver may compute it. It costs a
-    launch
-    a period: docs/controllers/callback.md has the price. Calls for one block come in the order of time; blocks run in threads.
+    t is the time of the tick [s]. y is the measured and r the wanted motion, each with arrays of m members (see
+    `lw.control.CallbackInput`); `members` are the members' indices (m,). The function may use NumPy, PyTorch, JAX or any
+    solver. Each period costs one launch; docs/controllers/callback.md has the measured cost.
+    Calls for one block come in the order of time; different blocks run in different threads.
 
     Args:
-        function: The function; it must be picklable where other processes run it.
-        to: Key of a term, or of several: then the function returns the commands of their channels, side by side,
-            (m, channels), and no law or allocation acts on them. None, the default, for demands.
+        function: The function. It must be picklable if other processes run it.
+        to: Key of a term, or a list of keys. The function then returns the commands of all their channels, side by side,
+            (m, channels), and no law or allocation acts on these terms. None, the default: it returns demands.
         version: Text or number that identifies the function in sweeps and stores; change it whenever the function changes.
-            None, the default: its code identifies it. Give one if the function reads files, or holds objects that cannot be
-            compared.
+            None, the default: the function's code identifies it. Give a version if the function reads files or holds
+            objects that cannot be compared.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -70,17 +70,17 @@ class Callback(ControlLaw):
 
     @property
     def targets(self) -> tuple[str, ...]:
-        """Keys of the terms whose commands the function returns; none where it returns demands."""
+        """Keys of the terms whose commands the function returns; empty if it returns demands."""
         return (self.to,) if isinstance(self.to, str) and self.to else tuple(self.to or ())
 
     def answers(self, channels: Mapping[str, int]) -> int:
         """Count of numbers that the function returns for a member.
 
         Args:
-            channels: Commands of each actuator, by its key.
+            channels: Number of commands of each actuator, by its key.
 
         Returns:
-            Those of `to` together, or six demands.
+            The number of channels of all terms in `to`, or 6 for a demand.
         """
         return sum(channels[key] for key in self.targets) or len(self.demands)
 
@@ -99,7 +99,7 @@ class Callback(ControlLaw):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CallbackCommands(Allocation):
-    """The allocation by which the answer of a `Callback` with `to` reaches its actuator; a `Controller` makes it."""
+    """Allocation that passes the answer of a `Callback` with `to` to its actuator; a `Controller` creates it."""
 
     device: ClassVar[str] = "callback_commands"
 
@@ -119,7 +119,7 @@ class CallbackCommands(Allocation):
 
 
 def refuse_second(callbacks: list[Callback]) -> None:
-    """Refuse more than one callback: each asks for a launch of its own."""
+    """Raise an error if there is more than one callback, since each would need its own launch."""
     if len(callbacks) > 1:
         raise refusal(
             "laws", f"{len(callbacks)} callbacks", "are more than one", "call the other function from the first"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""An estimator of the attitude."""
+"""Complementary filter, an estimator of the attitude."""
 
 from __future__ import annotations
 
@@ -12,14 +12,15 @@ from lgvi_warp.physics.terms.base import number
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ComplementaryFilter(MeasuringPart):
-    """Complementary filter of the attitude: measured rates at high frequency, a measured attitude at low frequency.
+    """Complementary filter of the attitude: uses measured rates at high and a measured attitude at low frequency.
 
-    R <- R exp(T (Omega_old + Omega) / 2), T the period; then R <- R exp((1 - exp(-T / time_constant)) e), e the rotation
-    vector from R to the measured attitude. It starts at the first measured attitude, and is listed after the sensors that it
-    uses. Mahony, Hamel & Pflimlin, IEEE Trans. Automatic Control 53 (2008); here without an estimate of the rates' bias.
+    At each tick R <- R exp(T (Omega_old + Omega) / 2), where T is the period. Then
+    R <- R exp((1 - exp(-T / time_constant)) e), where e is the rotation vector from R to the measured attitude. The filter
+    starts at the first measured attitude. List it after the sensors that it uses. It follows Mahony, Hamel & Pflimlin, IEEE
+    Trans. Automatic Control 53 (2008), without their estimate of the gyro bias.
 
     Args:
-        time_constant: Time after which the measured attitude counts more than the rates [s].
+        time_constant: Time scale [s] beyond which the measured attitude counts more than the rates.
 
     Raises:
         SceneError: If a number is invalid (see `Term`).

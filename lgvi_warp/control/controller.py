@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A controller: what it looks at, what it wants, how it acts, and how often."""
+"""A controller: its sensors, guidance, laws, allocation and faults, its period and its delay."""
 
 from __future__ import annotations
 
@@ -40,26 +40,26 @@ ACTUATOR = 'give the vehicle a term that does, [[terms]] type = "thrusters", "co
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Controller(Documented):
-    """A controller that acts at control ticks, once a period; its commands are held until the next one.
+    """A controller that acts once a period, at each tick; its commands are held until the next tick.
 
     Each list holds parts such as lw.control.HeadingPID(...), or tables as in a scene file.
 
     Args:
         period: Time between two ticks [s], a whole number of steps.
-        delay: Time from a tick until its commands act [s], a whole number of steps; may vary by member. 0 by default.
-        sensors: Sensors and estimators, in the order in which they act; by default the true motion is measured.
+        delay: Time from a tick until its commands take effect [s], a whole number of steps; may vary by member. 0 by default.
+        sensors: Sensors and estimators, in the order in which they act. Without sensors, the true motion is measured.
         guidance: Parts that set the wanted motion, in the order in which they act.
         laws: Parts that demand a wrench; their demands are added.
-        allocation: Parts that turn the demand into commands, in this order: each receives what those before it did not
-            deliver. By default the pseudo-inverse, if exactly one term takes commands.
+        allocation: Parts that turn the demand into commands, in this order. Each part receives the demand that the parts
+            before it did not deliver. By default the pseudo-inverse, if exactly one term takes commands.
         faults: Faults of actuators and of sensors.
 
     Methods:
         parameters: The numbers that may vary by member.
-        to_dict: The section [controller] of a scene file.
+        to_dict: The controller as the section [controller] of a scene file.
 
     Raises:
-        SceneError: If anything is wrong; the message lists every fault.
+        SceneError: If an argument is invalid; the message lists every fault.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -109,7 +109,7 @@ class Controller(Documented):
         faults.raise_if_any()
 
     def _check_wishes(self, faults: Faults) -> None:
-        """Require that what laws and guidance read of the wanted motion is given."""
+        """Add a fault for each quantity of the wanted motion that a part reads and no guidance sets."""
         wishes: set[str] = set()
         for part in (*self.guidance, *self.laws):
             for wish in part.needs:
@@ -124,21 +124,21 @@ class Controller(Documented):
 
     @property
     def parts(self) -> tuple[Part, ...]:
-        """All parts that have numbers, sensors first, as the user gave them; with their bus where the controller is wired."""
+        """All parts in the user's order, sensors first. The parts of a wired controller have their bus."""
         return tuple(part for section in SECTIONS for part in getattr(self, section))
 
     @property
     def delay_part(self) -> Delay:
-        """The delay as a part, whose key is that of the section."""
+        """The delay as a part; its key is "controller", that of the section."""
         part = Delay(name=self.key, period=self.period, delay=self.delay)
         object.__setattr__(part, "bus", self.bus)
         return part
 
     @property
     def acting_parts(self) -> tuple[Part, ...]:
-        """The parts in the order in which the kernel has them: altimeters first, which look from the true place.
+        """The parts in the kernel's order: altimeters come first, because they measure from the true position.
 
-        Faults of a sensor come right after it, others after the delay.
+        Faults of a sensor come directly after it, other faults after the delay.
         """
         callback, parts = self.callback, list[Part]()
         # The commands of a callback reach their actuator by an allocation of their own.
@@ -152,29 +152,29 @@ class Controller(Documented):
 
     @property
     def callback(self) -> Callback | None:
-        """The law that is a function of the host; None where there is none."""
+        """The law that is a Python function; None if there is none."""
         return next((part for part in self.laws if isinstance(part, Callback)), None)
 
     def parameters(self) -> dict[str, np.ndarray]:
         """The numbers that may vary by member.
 
         Returns:
-            "controller.delay", and the numbers of the parts by "key.field".
+            {name: number}: "controller.delay", and each number of a part as "key.field".
         """
         values = {f"{part.key}.{name}": value for part in self.parts for name, value in part.parameters().items()}
         return {f"{self.key}.delay": self.delay} | values
 
     def located(self, plane: LocalPlane | None) -> Controller:
-        """The same controller, whose parts know the positions of their places on the Earth.
+        """The same controller, with the parts' geodetic points converted to positions in inertial axes.
 
         Args:
-            plane: The plane of the scene's inertial axes on the Earth; None where the scene has no origin.
+            plane: The plane of the scene's inertial axes on the Earth; None if the scene has no origin.
 
         Returns:
             A copy.
 
         Raises:
-            SceneError: If a part has places, and the scene no origin.
+            SceneError: If a part has geodetic points and the scene has no origin.
         """
         located = copy.copy(self)
         faults = Faults("controller.")
@@ -193,19 +193,19 @@ class Controller(Documented):
         nominal: Mapping[str, np.ndarray] | None = None,
         events: Sequence[Event] = (),
     ) -> Controller:
-        """The same controller, whose parts know their actuators and the rows of the memory.
+        """The same controller, with parts that know their actuators and the rows of the memory.
 
         Args:
             terms: Terms of the scene.
-            nominal: Numbers of the vehicle and its environment by name, as the scene has them; none by default.
+            nominal: Numbers of the scene's vehicle and environment by name; none by default.
             events: Events of the scene; none by default.
 
         Returns:
             A copy.
 
         Raises:
-            SceneError: If an allocation or a fault names a term that takes no commands, or a part misses something of the
-                scene. The message lists every fault.
+            SceneError: If an allocation or a fault names a term that takes no commands, or the scene lacks something that a
+                part needs. The message lists every fault.
         """
         faults = Faults("controller.")
         able = {term.key: term for term in terms if term.channels}
@@ -247,42 +247,42 @@ class Controller(Documented):
 
     @property
     def asked(self) -> np.ndarray:
-        """1 for each of X Y Z K M N that some law asks for, else 0, (6,)."""
+        """1 for each of X Y Z K M N that some law demands, else 0, (6,)."""
         names = {name for law in self.laws for name in law.demands or COMPONENTS}
         return np.array([float(name in names) for name in COMPONENTS])
 
     @property
     def handed_rows(self) -> dict[str, int]:
-        """Rows that each sensor hands to an estimator, by its key."""
+        """Number of rows that each sensor passes to an estimator, by its key."""
         taken = {key for part in self.sensors for key in part.uses.values()}
         return {part.key: part.handed_rows for part in self.sensors if part.key in taken}
 
     @property
     def belief_rows(self) -> int:
-        """Rows of what an estimator believes."""
+        """Number of rows of the estimator's own state."""
         return sum(part.belief_rows for part in self.sensors)
 
     @property
     def rejected_rows(self) -> int:
-        """Rows, among those, of the counts of readings that its gate rejects."""
+        """Number of rows, among those of the estimator, that count the readings rejected by its gate."""
         return sum(part.rejected_rows for part in self.sensors)
 
     def _effect(self) -> np.ndarray:
-        """Effect of all channels on the demanded components, each column of unit size, (6, channels)."""
+        """Effect of all channels on the demanded components (6, channels); each column is scaled to length 1."""
         effect = self.asked[:, None] * np.concatenate([part.reach() for part in self.allocation], axis=1)
         sizes = np.linalg.norm(effect, axis=0)
         return np.asarray(effect / np.where(sizes > 0.0, sizes, 1.0))
 
     @property
     def unspanned(self) -> tuple[str, ...]:
-        """Components that laws ask for and the actuators cannot make, alone or each by itself."""
+        """Demanded components that the actuators cannot produce, or cannot produce independently of the others."""
         effect = self._effect()
         apart = np.eye(6) - effect @ np.linalg.pinv(effect, rcond=SPANNED)
         missed = self.asked * np.linalg.norm(apart, axis=0) > SPANNED
         return tuple(name for name, bad in zip(COMPONENTS, missed, strict=True) if bad)
 
     def undriven(self, terms: Sequence[Term]) -> tuple[str, ...]:
-        """Keys of the terms that take commands, and get none: of no allocation, and of no command or schedule of their own.
+        """Keys of the terms that can take commands but get none: no allocation, command or schedule drives them.
 
         Args:
             terms: The terms of the scene.
@@ -292,9 +292,9 @@ class Controller(Documented):
         )
 
     def unread(self, terms: Sequence[Term]) -> tuple[tuple[Part, str], ...]:
-        """(guidance, quantity) for each wanted quantity that no law reads, in its own or in other words.
+        """(guidance, quantity) for each wanted quantity that no law reads, not even as an equivalent quantity.
 
-        Where something else drives the vehicle, and no actuator could make a speed, one that a guidance must have is left out.
+        A speed that guidance requires is left out if no actuator can produce a forward force and every term gets commands.
 
         Args:
             terms: The terms of the scene.
@@ -313,12 +313,12 @@ class Controller(Documented):
 
     @property
     def idle(self) -> tuple[str, ...]:
-        """Keys of the actuators that make nothing of what laws ask for."""
+        """Keys of the actuators that cannot produce any demanded component."""
         parts = {part.to: part for part in self.allocation}
         return tuple(key for key in self.actuators if not np.any(self.asked[:, None] * parts[key].reach()))
 
     def _check_laws(self, faults: Faults) -> None:
-        """Add a fault for each law of whose demand the actuators can make nothing at all."""
+        """Add a fault for each law if the actuators cannot produce any component of its demand."""
         idle = {name for name, row in zip(COMPONENTS, self._effect(), strict=True) if np.all(np.abs(row) < SPANNED)}
         for law in self.laws:
             wanted = law.demands or COMPONENTS
@@ -334,7 +334,7 @@ class Controller(Documented):
             bus: Rows of the memory.
 
         Returns:
-            A copy, whose parts have this bus.
+            A copy; its parts have this bus as well.
         """
         controller = copy.copy(self)
         object.__setattr__(controller, "bus", bus)
@@ -347,7 +347,7 @@ class Controller(Documented):
         return controller
 
     def _allocation(self, faults: Faults, able: Mapping[str, Term]) -> tuple[Allocation, ...]:
-        """The allocation, or the default one, checked."""
+        """The given or the default allocation, after checks."""
         parts = tuple(self.allocation)
         if self.callback is not None and (keys := self.callback.targets):
             own = (CallbackCommands(to=key, before=keys[:i]) for i, key in enumerate(keys))
@@ -396,7 +396,7 @@ class Controller(Documented):
                 faults.add(key, part.channel, f"is beyond the {count} of {part.of}", remedy)
 
     def every(self, h: float) -> int:
-        """Steps between two ticks.
+        """Number of steps between two ticks.
 
         docs/theory/control_loop.md, (C1).
 
@@ -409,12 +409,12 @@ class Controller(Documented):
         return max(1, round(self.period / h))
 
     def check_step(self, faults: Faults, h: float, asked: float | None = None) -> None:
-        """Add a fault where period or delay is no whole number of steps.
+        """Add a fault if the period or the delay is not a whole number of steps.
 
         Args:
             faults: Collects the faults.
             h: Step of the run [s].
-            asked: The step that was asked for [s], where the end of the run or a sample time shortened it; by default None.
+            asked: The requested step [s], if the end of the run or a sample time shortened it; by default None.
         """
         for name, value in (("period", float(self.period)), ("delay", float(self.delay))):
             if _is_whole(name, value, h):
@@ -432,7 +432,7 @@ class Controller(Documented):
         """The controller as the section of a scene file.
 
         Returns:
-            Its numbers, and the lists that are not empty.
+            The period, the delay, and the lists that are not empty.
         """
         content: dict[str, Any] = {"period": float(self.period)}
         content |= {"delay": float(self.delay)} if self.delay else {}
@@ -441,7 +441,7 @@ class Controller(Documented):
 
 
 def from_table(table: Any) -> Controller | None:
-    """A controller from a Controller, the section of a scene file, or None for None."""
+    """The controller of a scene, given as a Controller or as the section of a scene file; None for None."""
     if table is None:
         return None
     example = "write [controller] and its keys below, or give lw.Controller(...)"
@@ -449,9 +449,9 @@ def from_table(table: Any) -> Controller | None:
 
 
 def terms_of(scene: Mapping[str, Any]) -> tuple[Term, ...]:
-    """The terms of a scene from its content, each of which knows its vehicle, and whether a controller drives it.
+    """The terms of a scene from its content; each knows its vehicle and whether a controller drives it.
 
-    The controller itself is not built: a law may be a function, of which the content has the name alone.
+    The controller itself is not built, because a law may be a function of which the content has only the name.
     """
     terms, table = from_list(scene.get("terms", ())), scene.get("controller")
     lists = (table.get(section) for section in ("laws", "allocation")) if isinstance(table, Mapping) else ()
@@ -465,7 +465,7 @@ def terms_of(scene: Mapping[str, Any]) -> tuple[Term, ...]:
 
 
 def _parts(section: str, base: type[Part], entries: Any) -> tuple[Part, ...]:
-    """The parts of a list, from objects or tables."""
+    """The parts of one list, from objects or tables."""
     entries = check_list(section, entries, f"write [[controller.{section}]] and type = ... below")
     faults, parts = Faults(), []
     known = base.kinds
@@ -487,11 +487,11 @@ def _parts(section: str, base: type[Part], entries: Any) -> tuple[Part, ...]:
 
 
 def _is_whole(name: str, value: float, h: float) -> bool:
-    """Whether a period, of one step at least, or a delay is a whole number of steps [s]."""
+    """Whether a period or a delay [s] is a whole number of steps; a period must have at least one."""
     return (name == "delay" or value >= 0.5 * h) and whole_steps(value, h) is not None
 
 
 def _chosen(part: Part, name: str) -> bool:
-    """Whether a part has a number that it need not have."""
+    """Whether the user gave a part an optional number."""
     optional = any(item.name == name and item.default is None for item in fields(part))
     return optional and getattr(part, name) is not None

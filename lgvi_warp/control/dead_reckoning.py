@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""An estimator of the position."""
+"""Dead reckoning, an estimator of the position."""
 
 from __future__ import annotations
 
@@ -23,14 +23,16 @@ class DeadReckoning(MeasuringPart):
     List it after the sensors that it uses. Without a position sensor it starts at the true position.
 
     Args:
-        rule: "trapezoid", the default, takes the mean of the velocities at both ticks; "euler" that of the last tick.
-        velocity: "velocity", the default, over ground; or "water_velocity", through the water: then a current carries the
-            estimate away.
-        depth: "reckoned", the default, like north and east; or "measured": the measured depth is kept.
-        start_error: Added to the position of the first tick, (3,) [m], inertial axes; 0 by default.
+        rule: "trapezoid", the default, integrates the mean of the velocities at the previous and the present tick; "euler"
+            integrates the velocity at the previous tick.
+        velocity: Velocity that is integrated: "velocity", the default, over ground; or "water_velocity", through the water,
+            with which the estimate drifts in a current.
+        depth: "reckoned", the default, computes the depth from the velocity, like north and east; "measured" uses the
+            measured depth.
+        start_error: Error added to the position of the first tick, (3,) [m], inertial axes; 0 by default.
 
     Raises:
-        SceneError: If a word is not known; or a number is invalid (see `Term`).
+        SceneError: If an option has an unknown value, or a number is invalid (see `Term`).
     """
 
     type: ClassVar[str] = "dead_reckoning"

@@ -18,10 +18,10 @@ MOST_PERIODS = 1000
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Delay(Part):
-    """The delay of a controller, a part that `Controller` makes of its numbers. Its key is that of the section.
+    """The delay of a controller, as a part that `Controller` creates from its period and delay. Its key is "controller".
 
     period: Time between two ticks [s].
-    delay: From a tick until its commands act [s].
+    delay: Time from a tick until its commands take effect [s].
     """
 
     device: ClassVar[str] = "delay"

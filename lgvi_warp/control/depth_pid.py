@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""PID of the depth by way of the pitch angle."""
+"""PID of the depth through the pitch angle."""
 
 from __future__ import annotations
 
@@ -14,15 +14,16 @@ from lgvi_warp.physics.terms.base import number
 class DepthPID(IntegralLaw):
     """PID of the depth by successive loop closure: an outer loop from depth to pitch, an inner loop from pitch to a moment M.
 
-    theta_d = -(kp e + ki I) within the pitch limit, e the wanted depth less the measured one: pitch up is positive, depth
-    grows downward. M = kp_pitch (theta_d - theta) + ki_pitch I_theta - kd_pitch q - k_heave w. For vehicles that move ahead.
+    The wanted pitch is theta_d = -(kp e + ki I), within the pitch limit, where e is the wanted minus the measured depth.
+    The sign is negative because pitch up is positive and depth grows downward. The demand is
+    M = kp_pitch (theta_d - theta) + ki_pitch I_theta - kd_pitch q - k_heave w. The law suits vehicles that move forward.
 
     Args:
         kp: Gain from depth to pitch [rad/m].
-        ki: Gain from the integral of the depth's error to pitch [rad/(m s)]; 0 by default.
-        pitch_limit: Limit of the wanted pitch [rad]; 0.5 by default.
-        kp_pitch: Gain of the pitch [N m/rad].
-        ki_pitch: Gain of the integral of the pitch's error [N m/(rad s)]; 0 by default.
+        ki: Gain from I, the integral of the depth error, to pitch [rad/(m s)]; 0 by default.
+        pitch_limit: Largest size of the wanted pitch [rad]; 0.5 by default.
+        kp_pitch: Gain of the pitch error [N m/rad].
+        ki_pitch: Gain of I_theta, the integral of the pitch error [N m/(rad s)]; 0 by default.
         kd_pitch: Gain of the pitch rate q [N m s/rad]; 0 by default.
         k_heave: Gain of the heave velocity w [N s]; 0 by default.
         integral_limit: Largest sizes of both integrals, (2,) [m s, rad s]; 1e6 by default.

@@ -20,32 +20,31 @@ WIDEST = 1.5
 class Docking(Guidance):
     """Approach a dock along its centre line at decreasing speed, and start again if the vehicle is outside the funnel.
 
-    With e the distance to starboard of the centre line and D the look-ahead, the wanted heading is the dock's minus atan((e
-    + kappa J) / D), where dJ/dt = D e / (D^2 + (e + kappa J)^2), as in `Waypoints` with "ilos". The wanted speed over
-    ground falls linearly with the distance, from `speed` at `slowing` before the dock to `contact_speed` at the dock. The
-    funnel has the radius `mouth` at the dock and grows by tan(`funnel`) with the distance. A vehicle that is nearer than
-    `judged` and outside the funnel starts again. It goes to the beginning of the line, `approach` before the dock,
-    displaced by `offset` to starboard, and from there along the line. A vehicle that reaches the dock's plane inside the
-    mouth is docked: its wanted speed is then 0, and its wanted position and heading are the dock's.
+    Let e be the distance to starboard of the centre line and D the look-ahead. The wanted heading is the dock's heading
+    minus atan((e + kappa J) / D), with dJ/dt = D e / (D^2 + (e + kappa J)^2) as in the "ilos" of `Waypoints`. The wanted
+    speed over ground falls linearly with the distance, from `speed` at the distance `slowing` to `contact_speed` at the
+    dock. The funnel's radius is `mouth` at the dock and grows by tan(`funnel`) per metre of distance. A vehicle that is
+    nearer than `judged` and outside the funnel starts again. It goes to the beginning of the line, which is `approach`
+    before the dock, displaced by `offset` to starboard, and from there along the line. A vehicle that reaches the dock's
+    plane inside the mouth is docked. Its wanted speed is then 0, and its wanted position and heading are the dock's.
 
     Args:
-        position: The dock, (3,) [m], inertial axes: the middle of its mouth.
-        heading: Heading of a vehicle that enters [rad].
+        position: Middle of the dock's mouth, (3,) [m], inertial axes.
+        heading: Heading at which a vehicle enters the dock [rad].
         speed: Speed of the approach [m/s], over ground.
         contact_speed: Speed at the dock [m/s], over ground, above 0.
-        slowing: Distance from the dock at which the speed begins to fall [m].
-        look_ahead: D [m].
+        slowing: Distance from the dock at which the wanted speed begins to fall [m].
+        look_ahead: Look-ahead distance D [m].
         mouth: Radius of the mouth [m].
         funnel: Half the opening angle of the funnel [rad], at most 1.5.
         approach: Distance from the dock at which the line begins [m].
         judged: Distance from the dock within which a vehicle must be in the funnel [m], at most `approach`.
-        offset: Distance to starboard of the line's beginning at which a new approach begins [m]; 0 by default. With twice
-            the turning radius, the vehicle ends its turn on the line.
+        offset: Distance to starboard of the line's beginning at which a new approach begins [m]; 0 by default. With an
+            offset of twice the turning radius, the vehicle ends its turn on the line.
         kappa: Gain of the integral [1/s]; 0.1 by default.
 
     Raises:
-        SceneError: If `judged` exceeds `approach`, or the contact speed is above the speed; or a number is
-            invalid (see `Term`).
+        SceneError: If `judged` exceeds `approach`, `contact_speed` exceeds `speed`, or a number is invalid (see `Term`).
 
     Examples:
         >>> import lgvi_warp as lw

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Common parts of allocations by efforts: the effect of a channel's effort, and the command that makes it."""
+"""Common parts of allocations by efforts: the effect of a channel's effort, and the command that produces this effort."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ MEASURED = "measured"
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class EffortAllocation(Allocation):
-    """An allocation by efforts: thrust of thrusters, angle of fins, force or moment of a control_wrench.
+    """Base class of allocations by efforts. An effort is the thrust of a thruster, a fin's angle, or a force or moment.
 
     Args:
         to: Key of the term that takes the commands.
         weights: Cost of each effort, (channels,), above 0; 1 by default.
-        speed: Speed ahead [m/s] at which the effect of fins is evaluated; 1 by default. "measured": at each tick the
-            measured speed ahead, through the water, but at least `least_speed`.
-        least_speed: Least speed [m/s] at which it is evaluated if `speed` is "measured".
+        speed: Forward speed [m/s] at which the effect of fins is evaluated; 1 by default. "measured" uses, at each tick,
+            the measured forward speed through the water, but at least `least_speed`.
+        least_speed: Least speed [m/s] at which the effect of fins is evaluated if `speed` is "measured".
     """
 
     words_for: ClassVar[Mapping[str, str]] = {"speed": MEASURED}
@@ -68,7 +68,7 @@ class EffortAllocation(Allocation):
 
     @property
     def words_at_speed(self) -> str:
-        """The word of the device code of an allocation at the measured speed, after a comma."""
+        """Suffix ",measured" of the device code of an allocation that uses the measured speed; else empty."""
         return ",measured" if self.measured else ""
 
     def check_actuator(self, faults: Faults) -> None:
@@ -90,33 +90,33 @@ class EffortAllocation(Allocation):
 
     @property
     def curve_word(self) -> str:
-        """The word of the device code for the shape: of a polynomial with the number of its powers."""
+        """Name of the shape in the device code: "powers" and the number of powers for a polynomial, else `shape`."""
         return f"powers{self.actuator.powers}" if self.shape == "polynomial" else self.shape
 
     def reach(self) -> np.ndarray:
         return self._effect(self.speed)
 
     def _effect(self, speed: Any) -> np.ndarray:
-        """Wrench of a unit of effort of each channel at a speed, in water of density 1."""
+        """Wrench of one unit of effort of each channel at a speed, in water of density 1 kg/m3."""
         numbers = {name: value[None] for name, value in self.actuator.parameters().items()}
         effect = self.actuator.effect(numbers, {"environment.water_density": np.ones(1)}, np.reshape(speed, 1))
         return np.asarray(effect[0])
 
     def effect_and_weights(self, numbers: Numbers, context: PackingContext) -> tuple[np.ndarray, np.ndarray]:
-        """The wrenches of a unit of effort (1 or n, 6, channels), without components for which no law asks, and weights."""
+        """Wrenches of one unit of effort (1 or n, 6, channels), with 0 for components that no law demands, and weights."""
         effect = self.actuator.effect(context.own(self.actuator), context.parameters, numbers.get("speed", np.ones(1)))
         B = self.asked[:, None] * effect
         return B, numbers.get("weights", np.ones((1, B.shape[2])))
 
     def at_speed(self, numbers: Numbers) -> dict[str, np.ndarray]:
-        """The numbers of the device code of an allocation at the measured speed; none of another."""
+        """Numbers of the device code that an allocation at the measured speed needs; empty for a fixed speed."""
         if not self.measured:
             return {}
         astern = 1.0 if np.allclose(self._effect(-1.0), self._effect(1.0)) else -1.0
         return {"least_speed": numbers["least_speed"], "astern": np.array([astern])}
 
     def channel_rows(self, B: np.ndarray, context: PackingContext, *more: np.ndarray) -> np.ndarray:
-        """The rows of each channel (1 or n, channels, rows), as of lgvi_kernels.laws.control.efforts; more: columns behind."""
+        """Rows of each channel (1 or n, channels, rows) for lgvi_kernels.laws.control.efforts; `more`: columns appended."""
         numbers, lost = context.own(self.actuator), self.lost_channels
         limit = numbers["limit"]
         keys = {"coefficient": np.ones_like(limit), "coefficient_astern": np.ones_like(limit), "dead_band": 0.0 * limit}
@@ -128,7 +128,7 @@ class EffortAllocation(Allocation):
         return side_by_side(np.swapaxes(B, -1, -2), *(column[..., None] for column in columns), *more)
 
     def _largest(self, numbers: Numbers, reach: np.ndarray) -> tuple[np.ndarray, ...]:
-        """The largest efforts (1 or n, channels) ahead and astern, without the coefficient; reach: of commands."""
+        """Largest efforts (1 or n, channels) ahead and astern, without the coefficient; `reach`: largest commands."""
         reach = np.maximum(reach, 0.0)
         if self.shape == "table":
             at, values = numbers["table_commands"], numbers["table_thrusts"]
@@ -142,7 +142,7 @@ class EffortAllocation(Allocation):
         return (reach if self.shape == "linear" else reach**2,) * 2
 
     def curves(self, numbers: Numbers) -> tuple[np.ndarray, int]:
-        """Rows of the curves and of their inverses, and how many there are of a kind."""
+        """Rows of the curves and then of their inverses, and the number of rows of the curves."""
         if self.shape in ("linear", "square"):
             return np.zeros((1, 0)), 0
         curves, size = self.actuator.curve_rows(numbers)
@@ -157,7 +157,7 @@ class EffortAllocation(Allocation):
         return side_by_side(curves, *sides), size
 
     def kind_of_curves(self, numbers: Numbers) -> dict[str, int]:
-        """Whether (1 or 0) polynomials of some member differ ahead and astern, and whether those of all are odd and do not."""
+        """Flags (1 or 0). sided: some member's polynomials differ ahead and astern. odd: none do, and all are odd."""
         ahead, astern = polynomials(numbers) if self.shape == "polynomial" else (np.zeros((1, 0)),) * 2
         same = np.array_equal(ahead, astern)
         return {"sided": int(not same), "odd": int(same and not np.any(ahead[:, 1::2]))}
@@ -168,19 +168,19 @@ RANK = 1e-10
 
 
 def polynomials(numbers: Numbers) -> tuple[np.ndarray, np.ndarray]:
-    """Polynomials of thrusters, ahead and astern."""
+    """Polynomials of thrusters ahead, and those astern."""
     return numbers["polynomial"], numbers["polynomial_astern"]
 
 
 def pseudo_inverse(B: np.ndarray, weights: np.ndarray, lost: Sequence[int]) -> np.ndarray:
-    """The pseudo-inverse (n, channels, 6) of the effect of those channels that are not lost."""
+    """The weighted pseudo-inverse (n, channels, 6) of the effect B, with 0 for lost channels."""
     scaled = B / np.sqrt(weights)[:, None, :]
     scaled[:, :, list(lost)] = 0.0
     return np.asarray(np.linalg.pinv(scaled, rcond=RANK) / np.sqrt(weights)[:, :, None])
 
 
 def rising_knots(at: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Knots of values (n, k); several may share one place and value, which changes nothing."""
+    """Rows of piecewise linear functions with values (n, k) at the points `at`; repeated equal knots are allowed."""
     width = np.diff(at, axis=1)
     inverse = np.divide(1.0, width, out=np.zeros_like(width), where=width > 0.0)
     steps = np.stack([at[:, :-1], inverse, np.diff(values, axis=1)], axis=-1)
@@ -196,12 +196,12 @@ TO_COEFFICIENTS = np.linalg.inv(np.polynomial.polynomial.polyvander(POINTS_OF_ST
 
 
 def inverse_rows(polynomial: np.ndarray, reach: np.ndarray) -> np.ndarray:
-    """The start of the inverse of polynomials f (1 or n, powers), from 0 to where they turn, or to their reach (1 or n,).
+    """Initial guess of the inverse of polynomials f (1 or n, powers), from 0 to their first maximum or their reach (1 or n,).
 
-    It is a polynomial in 2 s - 1, f = (largest f) (1 - (1 - s^2)^2), in which the inverse is smooth where f begins as a square
-    and where it turns (lgvi_kernels.laws.thrust_curves).
+    The guess is a polynomial in 2 s - 1, where f = (largest f) (1 - (1 - s^2)^2). In s the inverse is smooth both where f
+    begins as a square and at its maximum (lgvi_kernels.laws.thrust_curves).
 
-    Returns: Rows (1 or n, 20): 1 / largest value, that value, its argument, least slope, and the coefficients.
+    Returns: Rows (1 or n, 20): 1 / largest value, the largest value, its argument, the least slope, and the coefficients.
     """
     polynomial, reach = repeated(polynomial, reach)
     top = highest(polynomial, reach)
@@ -219,7 +219,7 @@ def inverse_rows(polynomial: np.ndarray, reach: np.ndarray) -> np.ndarray:
 
 
 def highest(polynomial: np.ndarray, reach: np.ndarray) -> np.ndarray:
-    """First maximum of polynomials (1 or n, powers) without constant part, (1 or n,), or their reach."""
+    """Argument (1 or n,) of the first maximum of polynomials (1 or n, powers) without constant part, or their reach."""
     polynomial, reach = repeated(polynomial, reach)
     points = reach[:, None] * np.linspace(0.0, 1.0, POINTS)
     values = polynomial_values(polynomial, points)
@@ -234,7 +234,7 @@ def highest(polynomial: np.ndarray, reach: np.ndarray) -> np.ndarray:
 
 
 def _last(holds: Callable[[np.ndarray], np.ndarray], low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """Last place at which a condition of an array holds, between low (holds) and high (fails), by bisection."""
+    """Points up to which conditions hold, elementwise, by bisection between `low`, where they hold, and `high`."""
     for _ in range(60):
         middle = 0.5 * (low + high)
         inside = holds(middle)

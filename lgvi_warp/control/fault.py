@@ -26,7 +26,7 @@ ANGLES = ("heading", "attitude")
 
 
 def _kinds(faults: Faults, key: str, value: Any) -> None:
-    """Read one of KINDS, or a list of them."""
+    """Add a fault unless the value is one of KINDS or a list of them."""
     words = [value] if isinstance(value, str) else items_of(value)
     if not words:
         faults.add(key, value, "is no kind of fault", f"give one or a list of {', '.join(KINDS)}")
@@ -40,43 +40,44 @@ def _is_channel(value: Any) -> bool:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Fault(Sending):
-    """A fault of an actuator or of a sensor: between two times its command or its reading x is altered.
+    """A fault of an actuator or of a sensor: between two times it changes the command or the reading x.
 
     | kind | |
     | --- | --- |
-    | gain | x <- gain x + offset: dead at a gain of 0, weak below 1 |
+    | gain | x <- gain x + offset: the actuator is dead at a gain of 0 and weak at a gain below 1 |
     | offset | x <- x + offset |
-    | stuck | an actuator stays where it is at the onset, a sensor at its last reading; or x <- value |
+    | stuck | x <- value; without a value, an actuator keeps its position and a sensor its last reading |
     | freeze | the last command or reading repeats |
-    | slow | x follows with the time constant, from the last one on |
-    | delay | x arrives later; until the first delayed one arrives, the last one repeats |
-    | intermittent | on and off: a command acts as with "gain", the last reading repeats, an estimator gets none |
+    | slow | x follows with a first-order lag, starting from the last command or reading |
+    | delay | x arrives later; until the first delayed x arrives, the last command or reading repeats |
+    | intermittent | on and off; while on, a command acts as with "gain", a reading repeats, an estimator gets no reading |
 
-    It begins at the first tick at or after `time`, and is over at the first at or after `until`. A sensor's fault acts
-    directly after the sensor, on the reading that has arrived. If an estimator takes the readings, the fault acts on those;
-    kinds with memory count new readings only. Laws are not informed of a fault, and their integrals continue.
+    The fault begins at the first tick at or after `time` and ends at the first tick at or after `until`. A sensor's fault
+    acts directly after the sensor, on the reading that has arrived. If an estimator takes the readings, the fault acts on
+    the readings it takes, and kinds with memory count only new readings. Laws are not informed of a fault, and their
+    integrals continue.
 
     Args:
         of: Key of the term or of the sensor.
-        channel: Number of the channel, from 0, or "all"; 0 by default. Of a sensor, of its reading: an attitude has roll,
-            pitch and yaw [rad]. Where an estimator takes them, of an `IMU` the means over a period of specific force (0 to 2)
-            [m/s^2] and rate (3 to 5) [rad/s], and of a `DVL` its beams.
-        kind: Kind of fault, or a list of kinds among which `choice` chooses; "gain" by default.
-        choice: Number of the kind in that list, from 0; 0 by default.
-        time: When it begins [s]; 0 by default; inf for never.
-        until: When it is over [s]; inf by default: it stays.
-        gain: Factor of the command or reading; 0 by default.
-        offset: Added to it, in its unit; 0 by default.
-        value: Command or reading of a channel that is stuck; by default where it was.
+        channel: Index of the channel, from 0, or "all"; 0 by default. For a sensor, index of the number in its reading: an
+            attitude has roll, pitch and yaw [rad]. If an estimator takes the readings, a `DVL` has its beams. An `IMU` then
+            has the means over a period of specific force (0 to 2) [m/s^2] and of angular rate (3 to 5) [rad/s].
+        kind: Kind of fault, or a list of kinds from which `choice` selects; "gain" by default.
+        choice: Index of the kind in that list, from 0; 0 by default.
+        time: Time at which the fault begins [s]; 0 by default; inf for never.
+        until: Time at which the fault ends [s]; inf by default: it does not end.
+        gain: Factor on the command or reading; 0 by default.
+        offset: Number added to the command or reading, in its unit; 0 by default.
+        value: Command or reading of a channel that is stuck; by default that at the onset.
         time_constant: Time constant of kind "slow" [s]; 1 by default.
         delay: Delay of kind "delay" [s], to the nearest tick; 1 by default.
-        duty: Fraction of each period, from its start, in which kind "intermittent" acts; 0.5 by default.
+        duty: Fraction of each period, from its start, in which kind "intermittent" is on; 0.5 by default.
         period: Time from one onset to the next of kind "intermittent" [s], to the nearest tick; 1 by default.
-        known: Whether the allocation excludes an actuator's channel from `time` on; False by default.
+        known: Whether the allocation excludes an actuator's channel from `time` on, for good; False by default.
 
     Raises:
-        SceneError: If `of` is no text, `channel` no whole number, a kind not known, `until` not after `time`, or `known`
-            neither true nor false; or a number is invalid (see `Term`).
+        SceneError: If `of` is not a text, `channel` is not a whole number, a kind is unknown, `until` is not after `time`,
+            `known` is neither true nor false, or a number is invalid (see `Term`).
 
     Examples:
         >>> import lgvi_warp as lw
@@ -113,7 +114,7 @@ class Fault(Sending):
 
     @property
     def kinds_listed(self) -> tuple[str, ...]:
-        """Kinds among which `choice` chooses."""
+        """Kinds from which `choice` selects."""
         return (self.kind,) if isinstance(self.kind, str) else tuple(self.kind)
 
     def check(self, faults: Faults) -> None:
@@ -153,16 +154,16 @@ class Fault(Sending):
 
     @property
     def _is_handed(self) -> bool:
-        """Whether an estimator takes the readings that it changes."""
+        """Whether an estimator takes the readings that the fault changes."""
         return self.of in self.bus.handed
 
     @property
     def _flags(self) -> int:
-        """Rows by which its sensor tells an estimator what is new."""
+        """Number of rows by which the sensor marks new readings for an estimator; 0 without an estimator."""
         return self.sensor.handed_flags if self._is_handed else 0
 
     def _is(self, numbers: Numbers) -> dict[str, np.ndarray]:
-        """For each kind the members (1 or n,) that have it, and in addition those with each way of the device code."""
+        """{kind: mask (1 or n,) of the members with it}, and a mask for each branch of the device code."""
         kinds = np.array(self.kinds_listed)[np.rint(numbers["choice"]).astype(int)]
         have = {word: kinds == word for word in KINDS}
         at_value = have["stuck"] & (self.value is not None)
@@ -237,10 +238,10 @@ class Fault(Sending):
 
     @property
     def _count(self) -> int:
-        """Channels of what has it."""
+        """Number of channels of the faulty actuator or sensor."""
         return int(self.sensor.fault_channels(self._is_handed) if self.sensor else self.actuator.channels)
 
 
 def _tick(time: np.ndarray, h: float, period: float) -> np.ndarray:
-    """The first tick at or after times [s]."""
+    """Index of the first tick at or after times [s]."""
     return np.ceil(first_step(time, h) / max(1, round(period / h)) - SAME_TIME)

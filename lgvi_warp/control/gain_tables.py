@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Gain tables: numbers of a law over a measured quantity, linear between nodes and held beyond the ends."""
+"""Gain tables: numbers of a law as functions of a measured quantity, linear between nodes and constant beyond the ends."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ EXAMPLE = 'give a number, or a table such as { over = "speed", at = [0.5, 2.0], 
 
 
 class GainTable(NamedTuple):
-    """Nodes of a number's table; the values at the nodes are the number itself, of one dimension more.
+    """Nodes of the table of a number; the number itself holds the values at the nodes, in an added first dimension.
 
-    over: Word of OVER. at: Its values at the nodes (k,), rising.
+    over: Measured quantity, a word of OVER. at: Values of this quantity at the nodes (k,), rising.
     """
 
     over: str
@@ -28,7 +28,7 @@ class GainTable(NamedTuple):
 
 
 def taken_tables(law: Any) -> dict[str, GainTable]:
-    """Put the values of a law's tables in place of them; return the nodes by the number's name."""
+    """Replace each table of a law by its values; return the nodes by the number's name."""
     faults, tables = Faults(f"{law.key}."), dict[str, GainTable]()
     for item in law.number_fields():
         table, name = getattr(law, item.name), word_of(item)
@@ -45,7 +45,7 @@ def taken_tables(law: Any) -> dict[str, GainTable]:
 
 
 def _read(name: str, table: Mapping[str, Any]) -> GainTable:
-    """The nodes of a table."""
+    """Check a table of a gain and return its nodes."""
     faults, at = Faults(), None
     faults.keys(name, table, KEYS)
     for key in (key for key in KEYS if key not in table):
@@ -62,7 +62,7 @@ def _read(name: str, table: Mapping[str, Any]) -> GainTable:
 
 
 def as_given(law: Any) -> dict[str, Any]:
-    """The tables of a law as a user writes them, by the number's name."""
+    """The tables of a law in the form that a user writes, by the number's name."""
     numbers = law.parameters()
     return {
         name: {"over": table.over, "at": table.at.tolist(), "values": numbers[name].tolist()}
@@ -71,7 +71,7 @@ def as_given(law: Any) -> dict[str, Any]:
 
 
 def sounder_of(law: Any, faults: Faults, sensors: Sequence[Any]) -> Any:
-    """The altimeter that tables over the altitude read; None where there is no such table, or after adding a fault."""
+    """The altimeter that tables over altitude read; None if there is no such table, or after adding a fault."""
     names = [name for name, table in law.gain_tables.items() if table.over == "altitude"]
     able = [sensor for sensor in sensors if sensor.type == "altimeter"]
     if names and len(able) != 1:
@@ -83,7 +83,7 @@ def sounder_of(law: Any, faults: Faults, sensors: Sequence[Any]) -> Any:
 
 
 def packed_with_tables(law: Any, numbers: Numbers, context: PackingContext) -> Packed:
-    """Packed numbers of a term, of a law with the rows of its tables behind its own: of each field that a number becomes."""
+    """Packed numbers of a term. For a law with gain tables, the rows of the tables follow the law's own rows."""
     if not getattr(law, "gain_tables", None):
         plain: Packed = law.packed(numbers, context)
         return plain

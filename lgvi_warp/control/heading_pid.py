@@ -12,9 +12,9 @@ from lgvi_warp.physics.terms.base import number
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class HeadingPID(IntegralLaw):
-    """PID of the heading: N = kp e + ki I + kd (wanted rate - r), with e the wanted heading less the measured one.
+    """PID of the heading: N = kp e + ki I + kd (wanted rate - r), where e is the wanted minus the measured heading.
 
-    e is in [-pi, pi]. The integral I gains e times the period at each tick.
+    e is in [-pi, pi], and r is the yaw rate. The integral I grows by e times the period at each tick.
 
     Args:
         kp: Proportional gain [N m/rad].

@@ -14,15 +14,16 @@ from lgvi_warp.physics.terms.base import number
 class HeadingSMC(IntegralLaw):
     """Integral sliding mode control of the heading, with Nomoto's model as feedforward (Fossen 2021, eq. 16.479).
 
-    psi is the heading, r its rate: sigma = (r - r_d) + 2 lambda (psi - psi_d) + lambda^2 I, r_v = r - sigma, a_v its rate
-    at the present errors, and N = (nomoto_time a_v + r_v - k_d sigma - k_sigma sat(sigma / boundary)) / nomoto_gain; sat(x)
-    is x within -1 and 1.
+    Let psi be the heading, r its rate, psi_d and r_d their wanted values, and I the integral of psi - psi_d. Then
+    sigma = (r - r_d) + 2 lambda (psi - psi_d) + lambda^2 I, r_v = r - sigma, and a_v is the rate of r_v at the present
+    errors. The demand is N = (nomoto_time a_v + r_v - k_d sigma - k_sigma sat(sigma / boundary)) / nomoto_gain, where sat(x)
+    is x limited to [-1, 1].
 
     Args:
-        lambda_: Rate at which errors decay while sigma is 0 [1/s]; `lambda` in a scene file.
+        lambda_: Rate at which errors decay while sigma is 0 [1/s]; its name is `lambda` in a scene file.
         boundary: Half the thickness of the layer about sigma = 0 in which N is continuous [rad/s].
-        k_sigma: Strength of the switching part [rad/s].
-        k_d: Strength of the linear part [1]; 0 by default.
+        k_sigma: Gain of the switching part [rad/s].
+        k_d: Gain of the linear part [1]; 0 by default.
         nomoto_gain: K of Nomoto's model T dr/dt + r = K N [rad/(s N m)].
         nomoto_time: T of Nomoto's model [s]; 0 by default.
         integral_limit: Largest size of I [rad s]; 1e6 by default.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""PID of the depth by a force."""
+"""PID of the depth with a heave force."""
 
 from __future__ import annotations
 
@@ -12,14 +12,15 @@ from lgvi_warp.physics.terms.base import number
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class HeavePID(IntegralLaw):
-    """PID of the depth by a force: Z = kp e + ki I + kd (wanted - measured depth rate), e the wanted less the measured depth.
+    """PID of the depth with a heave force: Z = kp e + ki I + kd (wanted - measured depth rate).
 
-    For vehicles that can push up and down. The integral I gains e times the period at each tick.
+    e is the wanted minus the measured depth. The integral I grows by e times the period at each tick. The law suits
+    vehicles with actuators that push up and down.
 
     Args:
         kp: Proportional gain [N/m].
         ki: Integral gain [N/(m s)]; 0 by default.
-        kd: Gain of the depth's rate, which is downward over ground [N s/m]; 0 by default.
+        kd: Gain of the depth rate, the downward velocity over ground [N s/m]; 0 by default.
         integral_limit: Largest size of I [m s]; 1e6 by default.
         anti_windup: "conditional", the default: an integrator stops while the actuators do not deliver the demand and its
             error would increase the shortfall; or "none".

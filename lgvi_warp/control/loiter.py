@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Guidance round a circle about a place."""
+"""Guidance along a circle about a point."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from lgvi_warp.physics.terms.base import number
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Loiter(Guidance):
-    """Circle a point for as long as the run lasts (Beard & McLain 2012, 10.2).
+    """Circle a point until the run ends (Beard & McLain 2012, 10.2).
 
-    With d the distance from the centre on the map, the wanted heading is that of the circle's tangent, turned towards the
-    circle by atan((d - radius) / look_ahead); the wanted heading rate on the circle is speed / radius. For laws of the
-    pose, the wanted position and velocity are those of the point of the circle abeam. A vehicle that cannot turn so tightly
-    circles outside.
+    Let d be the horizontal distance from the centre. The wanted heading is the direction of the circle's tangent, turned
+    towards the circle by atan((d - radius) / look_ahead). The wanted heading rate on the circle is speed / radius. Laws of
+    the pose get the position and velocity of the point of the circle that is abeam of the vehicle. A vehicle that cannot
+    turn so tightly follows a wider circle.
 
     Args:
-        center: The place, (3,) [m], inertial axes; its third number is the depth.
+        center: Centre of the circle, (3,) [m], inertial axes; its third number is the depth.
         radius: Radius of the circle [m].
-        speed: Wanted speed ahead through the water [m/s].
-        look_ahead: Look-ahead distance along the tangent [m]; some lengths of the vehicle.
-        clockwise: Whether clockwise as seen from above; by default True.
+        speed: Wanted forward speed through the water [m/s].
+        look_ahead: Look-ahead distance along the tangent [m]; a few vehicle lengths are usual.
+        clockwise: Whether the vehicle circles clockwise as seen from above; by default True.
 
     Examples:
         >>> import lgvi_warp as lw

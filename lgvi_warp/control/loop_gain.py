@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A factor on the demand of some laws, and what is added to it, by which margins are measured: no part that a user writes."""
+"""A factor on the demand of some laws and an added demand, to measure margins. Users do not write this part."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ FACTOR, ADDED = f"{END}.factor", f"{END}.added"
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class LoopBegin(ControlLaw):
-    """Notes the demand before the laws of a loop."""
+    """Stores the demand before the laws of a loop act."""
 
     device: ClassVar[str] = "loop_gain:begin"
     shared_rows: ClassVar[int] = 6
@@ -38,7 +38,7 @@ class LoopBegin(ControlLaw):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class LoopGain(LoopBegin):
-    """Multiplies each component of the demand of the laws since `LoopBegin`, and adds to it."""
+    """Multiplies each component of the demand of the laws since `LoopBegin` by a factor, and adds a demand."""
 
     device: ClassVar[str] = "loop_gain:end"
 
@@ -52,12 +52,12 @@ class LoopGain(LoopBegin):
 
 
 def of_all(factor: np.ndarray) -> np.ndarray:
-    """Factors (m, 6) on the components of a demand, from one on all of them (m,)."""
+    """Factors (m, 6) on the components of a demand, from one factor on all of them (m,)."""
     return np.repeat(factor[:, None], len(COMPONENTS), axis=1)
 
 
 def with_factor(laws: Sequence[ControlLaw], loop: str | None) -> list[ControlLaw]:
-    """The laws of a controller, with a factor on the demand of one of them by key, or of all for None."""
+    """The laws of a controller, with a factor on the demand of the law with the key `loop`, or of all laws for None."""
     chosen = [law for law in laws if loop in (None, law.key)]
     asks = tuple(name for name in COMPONENTS if any(name in (law.demands or COMPONENTS) for law in chosen))
     first, last = laws.index(chosen[0]), laws.index(chosen[-1])

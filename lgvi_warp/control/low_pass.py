@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A filter over what is measured."""
+"""Low-pass filter of a measured quantity."""
 
 from __future__ import annotations
 
@@ -15,15 +15,16 @@ from lgvi_warp.physics.terms.base import number
 class LowPass(MeasuringPart):
     """First-order low-pass filter of one measured quantity, exact for readings that are held over a period.
 
-    x <- x + (1 - exp(-T / time_constant)) (measured - x), T the period; it starts at the first reading. The difference of two
-    headings is within half a turn; an attitude moves by the same fraction of the rotation to the measured one.
+    At each tick x <- x + (1 - exp(-T / time_constant)) (measured - x), where T is the period; x starts at the first
+    reading. A difference of headings is taken within half a turn. An attitude turns by the same fraction of the rotation
+    to the measured attitude.
 
     Args:
-        of: Quantity that it filters, as in `lw.control.Sensor`.
-        time_constant: Its time constant [s]; 0 for no filter.
+        of: Quantity to filter, one of those of `lw.control.Sensor`.
+        time_constant: Time constant of the filter [s]; 0 for no filter.
 
     Raises:
-        SceneError: If `of` is not known; or a number is invalid (see `Term`).
+        SceneError: If `of` is unknown, or a number is invalid (see `Term`).
     """
 
     type: ClassVar[str] = "low_pass"

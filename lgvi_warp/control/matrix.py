@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Allocation by a matrix of the user's."""
+"""Allocation by a matrix that the user gives."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, number
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class AllocationMatrix(Allocation):
-    """Commands u = A w of the demand w = (X, Y, Z, K, M, N), each within its limit.
+    """Allocation by a given matrix A: commands u = A w of the demand w = (X, Y, Z, K, M, N), each within its limit.
 
-    The part that the commands do not deliver is fed back to the laws: (I - A^+ A) w, and A^+ times what the limits cut off,
-    with the pseudo-inverse A^+.
+    The undelivered part of the demand is fed back to the laws. It is (I - A^+ A) w, plus A^+ times the part of the commands
+    that the limits cut off, where A^+ is the pseudo-inverse.
 
     Args:
         to: Key of the term that takes the commands.
-        matrix: A, (channels, 6) [command's unit per N, per N m].
+        matrix: A, (channels, 6), in units of the command per N and per N m.
 
     Examples:
         >>> import lgvi_warp as lw

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Sea floor of the scene as parts of a controller know it."""
+"""The scene's sea floor, for parts of a controller that read it."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from lgvi_warp.physics.terms.floor import Floor
 
 
 def chosen(faults: Faults, where: str, name: Any, able: Sequence[Term], what: str, remedy: str) -> Any:
-    """The one of some things that a name says, or the only one for ""; None after adding a fault to `where`."""
+    """The thing among `able` with a name, or the only one for ""; None after adding a fault to `where`."""
     keys = [thing.key for thing in able]
     article = "an" if what[0] in "aeiou" else "a"
     if name and name not in keys:
@@ -28,7 +28,7 @@ def chosen(faults: Faults, where: str, name: Any, able: Sequence[Term], what: st
 
 
 def with_floor(part: Any, faults: Faults, events: Sequence[Term]) -> Any:
-    """A copy of a part that knows the floor which its field `floor` names."""
+    """A copy of a part that knows the floor named by its field `floor`."""
     floors = [event for event in events if isinstance(event, Floor)]
     remedy = 'give the scene one, such as [[events]] type = "floor", depth = 40.0'
     part = copy.copy(part)
@@ -37,7 +37,7 @@ def with_floor(part: Any, faults: Faults, events: Sequence[Term]) -> Any:
 
 
 def packed_over(ground: Floor, context: PackingContext, values: dict[str, Any]) -> Packed:
-    """Numbers for device code that looks up the floor's depth, per member, with other values."""
+    """Numbers of each member for device code that looks up the floor's depth, with further values."""
     return ground.packed_grid(own(ground, context.parameters), values)
 
 
@@ -46,7 +46,7 @@ NOWHERE = -1e6
 
 
 def seen_floors(controller: Any, events: Sequence[Any]) -> tuple[Floor, ...]:
-    """The floors that a controller looks at, of all events of its scene, as floors at which no member stops."""
+    """The floors among a scene's events that its controller reads, copied so that no member stops at them."""
     parts = controller.parts if controller is not None else ()
     grounds = {part.ground.key for part in parts if getattr(part, "ground", None) is not None}
     return tuple(replace(event, clearance=NOWHERE) for event in events if event.key in grounds)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A perceptron as a law."""
+"""A trained perceptron as a control law."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ MOST_NUMBERS = 1_000_000
 
 
 def _places() -> Iterator[tuple[str, str | None]]:
-    """Each number that a policy may look at, by name, and what must be wanted for it."""
+    """(name, quantity) for each input of a policy, with the quantity that guidance must set for it or None."""
     for name, (length, wish) in INPUTS.items():
         yield from ((name if length == 1 else f"{name}[{i}]", wish) for i in range(length))
 
@@ -53,23 +53,23 @@ PLACES = {name: (place, wish) for place, (name, wish) in enumerate(_places())}
 class Policy(ControlLaw):
     """A trained perceptron (multilayer network): y = f(W y + b) layer by layer; the demand is `scale` times the last layer.
 
-    The file holds weights_0 (n1, n0), biases_0 (n1,), weights_1 (n2, n1), ... as np.savez writes them, uncompressed; nothing
-    in it is executed. Inputs are wanted minus measured values, "depth_error", "heading_error" [m, rad], "speed_error"
-    [m/s], "position_error" [m, body axes], and "attitude_error", e_R of `PosePID`; and measured values, "depth" [m],
-    "velocity" over ground, "water_velocity" [m/s], "angular_velocity" [rad/s] and "down", the direction downward, all in
-    body axes. A name with [0], [1] or [2] is one number of three.
+    The file holds weights_0 (n1, n0), biases_0 (n1,), weights_1 (n2, n1), ... as np.savez writes them, uncompressed;
+    nothing in the file is executed. Inputs that are wanted minus measured values are "depth_error" [m], "heading_error"
+    [rad], "speed_error" [m/s], "position_error" [m, body axes], and "attitude_error", the e_R of `PosePID`. Inputs that are
+    measured values are "depth" [m] and, in body axes, "velocity" over ground [m/s], "water_velocity" [m/s],
+    "angular_velocity" [rad/s] and "down", the downward direction. A name with [0], [1] or [2] is one component of a vector.
 
     Args:
-        file: Path of the .npz file; in a scene file from the folder of the scene.
-        inputs: Names of the inputs in their order; together n0 numbers.
-        outputs: Which of "X", "Y", "Z", "K", "M", "N" the last layer's numbers are.
-        scale: Demand at an output of 1, one for each output [N, N m]; 1 by default.
-        activation: Of all layers but the last: "tanh", the default, or "relu".
-        output_activation: Of the last layer: "linear", the default, "tanh", or "clip", within -1 and 1.
-        checksum: Checksum of the file's numbers, so that another file is refused; by default any file is read.
+        file: Path of the .npz file. In a scene file the path is relative to the folder of the scene file.
+        inputs: Names of the inputs in their order; together they must have n0 numbers.
+        outputs: Components of the demand that the last layer gives, among "X", "Y", "Z", "K", "M", "N", in their order.
+        scale: Demand at an output of 1, one number for each output [N, N m]; 1 by default.
+        activation: Activation of all layers but the last: "tanh", the default, or "relu".
+        output_activation: Activation of the last layer: "linear", the default, "tanh", or "clip", which limits to [-1, 1].
+        checksum: Checksum of the file's numbers; a file with another checksum is refused. By default any file is read.
 
     Raises:
-        SceneError: If the file cannot be read, or does not fit inputs and outputs; or a number is invalid (see `Term`).
+        SceneError: If the file cannot be read or does not fit `inputs` and `outputs`, or a number is invalid (see `Term`).
     """
 
     type: ClassVar[str] = "policy"

@@ -14,22 +14,23 @@ from lgvi_warp.physics.terms.base import number
 class PosePID(PoseLaw):
     """Geometric PID of the pose, without Euler angles, stable from almost every attitude (Bullo & Murray 1995).
 
-    f = R^T (kp e_b + ki I) + kd (R^T v_d - nu), tau = -kr e_R - kw (Omega - R^T R_d Omega_d) - ki_r I_R, with
-    e_b = b_d - b and e_R = vee(R_d^T R - R^T R_d) / 2. The integrals I and I_R gain e_b and e_R times the period at each tick.
+    The demand is f = R^T (kp e_b + ki I) + kd (R^T v_d - nu) and tau = -kr e_R - kw (Omega - R^T R_d Omega_d) - ki_r I_R.
+    The errors are e_b = b_d - b and e_R = vee(R_d^T R - R^T R_d) / 2; the index d marks wanted values. The integrals I and
+    I_R grow by e_b and e_R times the period at each tick.
 
     Args:
-        kp: Gains of the position (3,) [N/m], inertial axes.
-        ki: Gains of its integral (3,) [N/(m s)], inertial axes; 0 by default.
-        kd: Gains of the velocity (3,) [N s/m], body axes.
-        kr: Gains of the attitude (3,) [N m], body axes.
-        ki_r: Gains of its integral (3,) [N m/s], body axes; 0 by default.
-        kw: Gains of the angular velocity (3,) [N m s], body axes.
+        kp: Gains of the position error (3,) [N/m], inertial axes.
+        ki: Gains of I (3,) [N/(m s)], inertial axes; 0 by default.
+        kd: Gains of the velocity error (3,) [N s/m], body axes.
+        kr: Gains of the attitude error (3,) [N m], body axes.
+        ki_r: Gains of I_R (3,) [N m/s], body axes; 0 by default.
+        kw: Gains of the angular velocity error (3,) [N m s], body axes.
         integral_limit: Largest sizes of each number of I and of I_R, (2,) [m s, s]; 1e6 by default.
-        feedforward: "restoring" balances weight, buoyancy and their moment at the measured attitude, by the scene's numbers
-            for every member; or "none", the default.
+        feedforward: "restoring" balances weight, buoyancy and their moment at the measured attitude. It uses the scene's
+            nominal numbers for every member. "none", the default, adds nothing.
         anti_windup: "conditional", the default: an integrator stops while the actuators do not deliver the demand and its
-            error would increase the shortfall; or "none". The position's integrator stops by body axis, since actuators
-            push along these.
+            error would increase the shortfall; or "none". The position's integrator stops for each body axis separately,
+            since actuators act along body axes.
 
     Examples:
         >>> import lgvi_warp as lw

@@ -12,27 +12,27 @@ from lgvi_warp.physics.terms.base import number
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PoseSMC(PoseLaw):
-    """Integral sliding mode control of the pose, each body axis by itself (the form of Fossen 2021, 16.4, on SE(3)).
+    """Integral sliding mode control of the pose, separately for each body axis (the form of Fossen 2021, 16.4, on SE(3)).
 
-    s = (R^T v_d - nu) + 2 lambda R^T e_b + lambda^2 R^T I, and f = k_d s + k_sigma sat(s / boundary); the same of the attitude
-    with s_r = -(Omega - R^T R_d Omega_d) - 2 lambda_r e_R - lambda_r^2 I_R; e_b, e_R, I and I_R as in `PosePID`, sat(x) is
-    x within -1 and 1.
+    For the position, s = (R^T v_d - nu) + 2 lambda R^T e_b + lambda^2 R^T I and f = k_d s + k_sigma sat(s / boundary). For
+    the attitude, s_r = -(Omega - R^T R_d Omega_d) - 2 lambda_r e_R - lambda_r^2 I_R, and the moment has the same form as f.
+    e_b, e_R, I and I_R are those of `PosePID`, and sat(x) is x limited to [-1, 1].
 
     Args:
-        lambda_: Rates at which errors of position decay while s is 0 (3,) [1/s]; `lambda` in a scene file.
+        lambda_: Rates at which position errors decay while s is 0 (3,) [1/s]; its name is `lambda` in a scene file.
         boundary: Half the thickness of the layer about s = 0 in which f is continuous (3,) [m/s].
-        k_sigma: Strength of the switching part (3,) [N].
-        k_d: Strength of the linear part (3,) [N s/m].
-        lambda_r: The same as lambda, of the attitude (3,) [1/s].
-        boundary_r: The same as boundary, of the attitude (3,) [rad/s].
-        k_sigma_r: The same as k_sigma, of the attitude (3,) [N m].
-        k_d_r: The same as k_d, of the attitude (3,) [N m s].
+        k_sigma: Gains of the switching part (3,) [N].
+        k_d: Gains of the linear part (3,) [N s/m].
+        lambda_r: As `lambda`, for the attitude (3,) [1/s].
+        boundary_r: As `boundary`, for the attitude (3,) [rad/s].
+        k_sigma_r: As `k_sigma`, for the attitude (3,) [N m].
+        k_d_r: As `k_d`, for the attitude (3,) [N m s].
         integral_limit: Largest sizes of each number of I and of I_R, (2,) [m s, s]; 1e6 by default.
-        feedforward: "restoring" balances weight, buoyancy and their moment at the measured attitude, by the scene's numbers
-            for every member; or "none", the default.
+        feedforward: "restoring" balances weight, buoyancy and their moment at the measured attitude. It uses the scene's
+            nominal numbers for every member. "none", the default, adds nothing.
         anti_windup: "conditional", the default: an integrator stops while the actuators do not deliver the demand and its
-            error would increase the shortfall; or "none". The position's integrator stops by body axis, since actuators
-            push along these.
+            error would increase the shortfall; or "none". The position's integrator stops for each body axis separately,
+            since actuators act along body axes.
     """
 
     type: ClassVar[str] = "pose_smc"

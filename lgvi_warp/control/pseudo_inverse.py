@@ -19,17 +19,18 @@ MOST_LOST = 4
 class PseudoInverse(EffortAllocation):
     """Allocation by a weighted pseudo-inverse: least sum of weight t^2, wrench B t nearest to the demand (Fossen 2021, 11.2).
 
-    t = W^-1 B^T (B W^-1 B^T)^+ w. Components that no law demands are ignored. The effort t is the thrust of a thruster,
-    whose curve is inverted; the angle of a fin, whose effect B is that at `speed`; or the force or moment of a
-    control_wrench. Thrust is that at zero advance speed: the loss by advance is not compensated, and counts as delivered.
-    Thrusters with a polynomial need a `limit`: the polynomial is inverted up to it, or up to its turning point.
+    For the demand w and weights W, the efforts are t = W^-1 B^T (B W^-1 B^T)^+ w. Components that no law demands are
+    ignored. An effort is the thrust of a thruster, whose curve is inverted; the angle of a fin, with its effect B at
+    `speed`; or the force or moment of a control_wrench. Thrust means thrust at zero advance speed: the loss by advance is
+    not compensated, and the demand counts as delivered. Thrusters with a polynomial need a `limit`. The polynomial is
+    inverted up to this limit, or up to its first maximum if that comes before.
 
     Args:
         to: Key of the term that takes the commands.
         weights: Cost of each effort, (channels,), above 0; 1 by default.
-        speed: Speed ahead [m/s] at which the effect of fins is evaluated; 1 by default. "measured": at each tick the
-            measured speed ahead, through the water, but at least `least_speed`.
-        least_speed: Least speed [m/s] at which it is evaluated if `speed` is "measured".
+        speed: Forward speed [m/s] at which the effect of fins is evaluated; 1 by default. "measured" uses, at each tick,
+            the measured forward speed through the water, but at least `least_speed`.
+        least_speed: Least speed [m/s] at which the effect of fins is evaluated if `speed` is "measured".
     """
 
     type: ClassVar[str] = "pseudo_inverse"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A filter of what is wanted: a reference model of third order."""
+"""Third-order reference model, a filter of the wanted motion."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ TERMS = 13
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ReferenceModel(Guidance):
-    """Smooth path from the measured state to the values that the guidance before it wants (Fossen 2021, 12.1.1).
+    """Smooth path from the measured state to the values that preceding guidance wants (Fossen 2021, 12.1.1).
 
     Each number x follows its target s by x''' + (2 zeta + 1) omega x'' + (2 zeta + 1) omega^2 x' + omega^3 (x - s) = 0. It
-    starts at the measured position, heading and rates. Between ticks the target is held and the equation solved exactly;
-    if x' is then beyond its limit, x moves at the limit over the whole period, and x'' is 0. A heading goes the short way
-    to its target, and may pass pi. Wanted roll and pitch are not changed.
+    starts at the measured position, heading and rates. Between ticks the target is held and the equation is solved
+    exactly. If x' then exceeds its limit, x moves at the limit over the whole period, and x'' is 0. A heading turns the
+    short way to its target and may pass pi. Wanted roll and pitch are not changed.
 
     Args:
         natural_frequency: omega (2,) [rad/s] of depth and heading, or (4,) of north, east, depth and heading.
-        damping_ratio: zeta, as many; 1 by default.
-        rate_limit: Largest rates x', as many [m/s, the last one rad/s]; by default none.
+        damping_ratio: zeta, one for each natural frequency; 1 by default.
+        rate_limit: Largest rates x', one for each natural frequency [m/s, and rad/s for the last]; by default no limit.
     """
 
     type: ClassVar[str] = "reference_model"
@@ -60,7 +60,7 @@ class ReferenceModel(Guidance):
 
 
 def _maps(omega: np.ndarray, zeta: np.ndarray, period: float) -> np.ndarray:
-    """Transition over a period of (x - s, x', x''), (n, count, 3, 3): the exponential of the model's matrix."""
+    """Transition matrices (n, count, 3, 3) of (x - s, x', x'') over a period: exponentials of the model's matrix."""
     # In units of 1 / omega, so that all entries are of one size: halved until small, a series, and squared as often.
     A = np.zeros((*omega.shape, 3, 3))
     A[..., 0, 1] = A[..., 1, 2] = 1.0

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Sensors: what is measured in place of the truth."""
+"""Sensors, whose readings replace the true values in the measured motion."""
 
 from __future__ import annotations
 
@@ -51,41 +51,41 @@ RANGE = "range"
 class Sensor(MeasuringPart):
     """Sensor of one quantity: truth + bias + random walk + noise, rounded; with a rate, a latency and lost readings.
 
-    The numbers are in the unit of what is measured: m, rad, m/s or rad/s; of a 3-vector each is one number, which stands for
-    all axes, or three. An attitude is turned by the errors as a rotation vector of the body's axes, and the quantum is that of
-    roll, pitch and yaw; a heading is turned about the vertical. The random numbers follow from the seed, the member, the tick
-    and the sensor's name: they are the same for all gains, methods and steps.
+    The numbers are in the unit of the measured quantity: m, rad, m/s or rad/s. For a 3-vector, each is one number for all
+    axes or three numbers. The errors of an attitude turn it by a rotation vector in body axes, and its quantum applies to
+    roll, pitch and yaw. The errors of a heading turn it about the vertical. The random numbers follow from the seed, the
+    member, the tick and the sensor's name, so they are the same for all gains, methods and steps.
 
     Args:
-        of: What it measures: "depth", "heading", "position", "attitude", "velocity" (over ground), "water_velocity" or
-            "angular_velocity"; velocities in the body's axes.
+        of: Measured quantity: "depth", "heading", "position", "attitude", "velocity" (over ground), "water_velocity" or
+            "angular_velocity"; velocities are in body axes.
         noise: Standard deviation of each reading; 0 by default.
-        bias: Added to each reading; 0 by default.
-        drift: Random walk: its standard deviation after 1 s, in the unit of the reading / s^1/2; 0 by default.
-        quantum: Readings are rounded to whole multiples of this; 0 by default, not at all.
-        every: Ticks from one new reading to the next, a whole number; 1 by default. In between the last one is kept.
+        bias: Constant error added to each reading; 0 by default.
+        drift: Standard deviation of the random walk after 1 s, in the unit of the reading / s^1/2; 0 by default.
+        quantum: Readings are rounded to whole multiples of this number; 0 by default, for no rounding.
+        every: Ticks from one new reading to the next, a whole number; 1 by default. In between, the last reading is kept.
         latency: Ticks until a reading arrives, a whole number; 0 by default. Until then the first reading is used.
-        dropout: Probability with which a reading is lost, so that the last one is kept; 0 by default. The first is never lost.
+        dropout: Probability that a reading is lost, so that the last reading is kept; 0 by default. The first is never lost.
         burst: Mean length of a run of lost readings [ticks], at least 1 and dropout / (1 - dropout); by default, or at 0,
             losses are independent. The share of lost readings stays `dropout` (Gilbert 1960, a chain of two states).
-        outlier: Probability with which a reading is an outlier; by default none is.
-        outlier_std: Standard deviation of what an outlier adds to the reading.
-        deepest: Depth of its place below which readings are lost, as those of GPS are [m]; inf by default.
-        place: Place of a sensor of position or depth (3,) [m], body axes, as of an antenna; by default the body's origin. It
-            reads the position or the depth of this place.
-        reads: How a depth is read: "geometry", the default, the distance from the mean surface; or "pressure", as a pressure
-            cell: p / (rho g) below the scene's tide, with the pressure of waves by linear theory, which decays with depth.
-                It is 0 out of the water.
+        outlier: Probability that a reading is an outlier; by default there are no outliers.
+        outlier_std: Standard deviation of the error that an outlier adds to the reading.
+        deepest: Depth of the sensor below which readings are lost [m], as for GPS; inf by default.
+        place: Position of a sensor of position or depth on the body, such as an antenna, (3,) [m], body axes; by default the
+            body's origin. The sensor reads the position or depth of this point.
+        reads: How a depth is read. "geometry", the default, is the distance from the mean surface. "pressure" is the
+            reading p / (rho g) of a pressure cell below the scene's tide. It includes the pressure of waves by linear theory,
+            which decays with depth, and is 0 out of the water.
 
-    The reading of the first tick always arrives, at once and whatever the depth: it stands for a reading on deck, before
+    The reading of the first tick always arrives, without latency and at any depth: it stands for a reading on deck before
     the run. A `DVL`, which needs the floor, has no such reading: its velocity is 0 before the first lock.
 
-    An estimator that names the sensor (see lw.control.ErrorStateFilter) takes the readings itself: then the measured motion
-    is not changed, no reading is repeated, the first may be lost, and the estimator accounts for the latency.
+    An estimator that names the sensor (see lw.control.ErrorStateFilter) takes the readings itself. The sensor then does not
+    change the measured motion, no reading is repeated, the first may be lost, and the estimator accounts for the latency.
 
     Raises:
-        SceneError: If `of` is not known, `every` or `latency` is no whole number, or a place is given for another
-            reading; or a number is invalid (see `Term`).
+        SceneError: If `of` is unknown, `every` or `latency` is not a whole number, `place` is given for another quantity, or
+            a number is invalid (see `Term`).
 
     Examples:
         >>> import lgvi_warp as lw
@@ -130,12 +130,12 @@ class Sensor(MeasuringPart):
 
     @property
     def count(self) -> int:
-        """Count of numbers that it reads."""
+        """Count of numbers in a reading."""
         return READINGS[self.of]
 
     @property
     def reading(self) -> str:  # type: ignore[override]
-        """Its reading, among READINGS."""
+        """The measured quantity, among READINGS."""
         return self.of
 
     def fault_channels(self, handed: bool) -> int:
@@ -201,13 +201,13 @@ class Sensor(MeasuringPart):
         return self.count + 1
 
     def streams(self, acting: Collection[str]) -> tuple[Stream, ...]:
-        """Streams of its draws.
+        """Streams of the sensor's random draws.
 
         Args:
-            acting: Names of its numbers that vary, or are not zero.
+            acting: Names of the sensor's numbers that vary or are not zero.
 
         Returns:
-            The streams, at each tick.
+            The streams of these numbers, drawn at each tick.
         """
         count = self.count
         drift = Stream("drift", 1, 0, 1) if count == 1 else Stream("drift", 3, 1)
@@ -258,14 +258,14 @@ class Sensor(MeasuringPart):
 
 
 def level_of(chance: np.ndarray) -> np.ndarray:
-    """The level below which a standard normal is with a probability, within float32."""
+    """The level below which a standard normal number lies with a given probability, within the range of float32."""
     from scipy.special import ndtri
 
     return np.asarray(np.clip(ndtri(chance), -BOTTOMLESS, BOTTOMLESS))
 
 
 def burst_levels(numbers: Numbers) -> dict[str, np.ndarray]:
-    """Levels of the normals by which readings begin to be lost, and stay so, of a sensor with `dropout` and `burst`."""
+    """Levels of normal numbers below which a burst of lost readings begins, and continues, from `dropout` and `burst`."""
     lost, length = repeated(numbers["dropout"], numbers["burst"])
     apart = length == 0.0
     ends = 1.0 / np.where(apart, 1.0, length)
@@ -274,13 +274,13 @@ def burst_levels(numbers: Numbers) -> dict[str, np.ndarray]:
 
 
 def is_short(numbers: Numbers) -> np.ndarray:
-    """Whether the mean length of a burst is too short for the share of lost readings, (n,)."""
+    """Mask (n,) of members whose mean length of a burst is too short for their share of lost readings."""
     lost, length = repeated(numbers["dropout"], numbers["burst"])
     return np.asarray((length > 0.0) & ((length < 1.0) | (lost > (1.0 - lost) * length)) & (lost < 1.0))
 
 
 def check_burst(part: Any, faults: Faults) -> None:
-    """Add a fault where the mean length of a burst is too short."""
+    """Add a fault if the mean length of a burst is too short."""
     if part.burst is not None and is_short({name: np.array([getattr(part, name)]) for name in ("dropout", "burst")})[0]:
         least = max(1.0, float(part.dropout) / (1.0 - float(part.dropout)))
         problem = f"is too short for dropout = {float(part.dropout):g}"
@@ -288,10 +288,10 @@ def check_burst(part: Any, faults: Faults) -> None:
 
 
 def _vector(values: np.ndarray) -> np.ndarray:
-    """Values (n,) or (n, 3) as 3-vectors; a scalar is the first number."""
+    """Values (n,) or (n, 3) as 3-vectors; a scalar becomes the first component."""
     return values if values.ndim > 1 else values[:, None] * np.eye(3)[0]
 
 
 def _whole(name: str, values: np.ndarray) -> np.ndarray:
-    """Numbers of ticks rounded, as they may vary by member; others as they are."""
+    """Values, rounded if they are numbers of ticks, since draws for members need not be whole."""
     return np.rint(values) if name in ("every", "latency") else values

@@ -15,17 +15,17 @@ from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, number
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SetPoint(Guidance):
-    """Constant set-point: position, heading and speed. What is omitted is left to the preceding guidance.
+    """Constant set-point of position, heading and speed. Preceding guidance sets any quantity that is omitted.
 
     Args:
         position: Wanted position, (3,) [m], inertial axes.
         depth: Wanted depth [m], without a position in north and east; give either `depth` or `position`.
-        heading: Wanted heading [rad], from north to east; roll and pitch are wanted as 0. With a position it is 0 by
-            default.
-        speed: Wanted speed ahead through the water [m/s].
+        heading: Wanted heading [rad], from north to east; the wanted roll and pitch are 0. With a position, the heading is
+            0 by default.
+        speed: Wanted forward speed through the water [m/s].
 
     Raises:
-        SceneError: If nothing is given, or both position and depth; or a number is invalid (see `Term`).
+        SceneError: If no quantity is given, both `position` and `depth` are given, or a number is invalid (see `Term`).
 
     Examples:
         >>> import lgvi_warp as lw

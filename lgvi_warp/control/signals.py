@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Quantities that a run may save beside the motion, signals of a controller and the energy used.
+"""Quantities that a run may save in addition to the motion: signals of a controller and the energy used.
 
-Shape, unit and meaning, by name.
+A table gives the shape, unit and meaning of each by its name.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class Signal(NamedTuple):
-    """A signal, and where the kernel has it; the shape of its field is (1,) where the scene's commands tell the size."""
+    """A signal and its rows in the kernel. The field's shape is (1,) if the size follows from the scene's commands."""
 
     field: Field
     group: str
@@ -77,7 +77,7 @@ def _noted(group: str, word: str, kinds: Mapping[str, Field], rows: Mapping[str,
 
 
 class SignalTable(registry.Kinds):
-    """Signals by name. A part of an extension adds its own, when its module is imported, by `add_signals`."""
+    """Signals by name. A part of an extension adds its own signals by `add_signals` when its module is imported."""
 
     def _import(self, word: object) -> None:
         # No extension is asked for what is no signal.
@@ -98,7 +98,7 @@ _SOME: dict[str, tuple[str, str]] = {
 def add_signals(*signals: Signal, absent: tuple[str, str] | None = None) -> None:
     """Add signals to the table.
 
-    absent: Where only some controllers have the group of these signals, what is wrong without it, and the remedy.
+    absent: Problem and remedy to report for a controller without these signals, if only some controllers have them.
     """
     for signal in signals:
         SIGNALS[signal.field.name] = signal
@@ -125,7 +125,7 @@ add_signals(
 
 
 class Names(Collection[str]):
-    """Names of samples: those of the motion, of all signals, and others. An extension is asked for a name that is none."""
+    """Names of samples: those of the motion, of all signals, and others. Extensions are searched for an unknown name."""
 
     def __init__(self, *others: str):
         self._others = others
@@ -151,7 +151,7 @@ def ordered(names: Iterable[str]) -> tuple[str, ...]:
 
 
 def saved_fields(controller: Controller | None, accounted: bool = False) -> dict[str, Field]:
-    """The fields that runs of a scene with this controller, wired, may save; accounted: it accounts the energy used."""
+    """Fields that runs with this wired controller may save; `accounted`: whether the scene accounts the energy used."""
     fields = {name: TABLE[name] for name in FIELDS}
     if accounted:
         fields[ENERGY_USED] = SIGNALS[ENERGY_USED].field
@@ -168,7 +168,7 @@ def saved_fields(controller: Controller | None, accounted: bool = False) -> dict
 
 
 def _absent(controller: Controller) -> set[str]:
-    """The groups of signals, and the single ones, that a wired controller has not."""
+    """The groups of signals, and the single signals, that a wired controller lacks."""
     rows = {ESTIMATE: controller.bus.belief, REJECTED: controller.bus.rejected, UNCONVERGED: controller.bus.unconverged}
     rows[NAVIGATION_ERROR] = max((int(part.estimates_position) for part in controller.sensors), default=0) - 1
     return {group for group, row in rows.items() if row < 0}
@@ -180,7 +180,7 @@ def field_of(name: str) -> Field:
 
 
 def has_shape(name: str, shape: tuple[int, ...]) -> bool:
-    """Whether numbers of one vehicle at one time may have this shape, in some scene."""
+    """Whether a field of one vehicle at one time can have this shape in some scene."""
     if name in CHANNELS:
         return len(shape) == 1 and shape[0] > 0
     return shape == field_of(name).shape
@@ -202,7 +202,7 @@ def row_of(name: str, bus: Bus, noted: Mapping[str, int]) -> int:
 
 
 def check_names(faults: Faults, key: str, names: Any) -> tuple[str, ...]:
-    """Read a list of names of samples, and add a fault for each that no sample has."""
+    """Read a list of names of samples, and add a fault for each unknown name."""
     read = items_of(names)
     if read is None:
         faults.add(key, names, "is not a list of names", 'give one, such as ["position", "attitude"]')

@@ -12,14 +12,15 @@ from lgvi_warp.physics.terms.base import number
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SpeedPID(IntegralLaw):
-    """Control of the speed ahead u through the water: X = kp e + ki I + drag u_d |u_d|, e the wanted speed u_d less u.
+    """PI of the forward speed u through the water: X = kp e + ki I + drag u_d |u_d|, where e = u_d - u.
 
-    It has no derivative: no acceleration is measured. The integral I gains e times the period at each tick.
+    u_d is the wanted speed. The law has no derivative part, since no acceleration is measured. The integral I grows by e
+    times the period at each tick.
 
     Args:
         kp: Proportional gain [N s/m].
         ki: Integral gain [N/m]; 0 by default.
-        drag: Feedforward, the drag over the speed squared [N s^2/m^2]; 0 by default.
+        drag: Feedforward coefficient, drag divided by the square of the speed [N s^2/m^2]; 0 by default.
         integral_limit: Largest size of I [m]; 1e6 by default.
         anti_windup: "conditional", the default: an integrator stops while the actuators do not deliver the demand and its
             error would increase the shortfall; or "none".

@@ -12,10 +12,10 @@ from lgvi_warp.physics.terms.base import number
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class StateFeedback(ControlLaw):
-    """The demand w = -K x of the error x (12,), such as of a linear quadratic regulator.
+    """Linear state feedback: the demand w = -K x of the error x (12,), as of a linear quadratic regulator.
 
-    x = (b - b_d, e_R, nu - R^T v_d, Omega - R^T R_d Omega_d): position in inertial axes [m], attitude as in `PosePID` [1],
-    velocity over ground [m/s] and angular velocity [rad/s] in body axes.
+    x = (b - b_d, e_R, nu - R^T v_d, Omega - R^T R_d Omega_d), measured minus wanted values: position in inertial axes [m],
+    attitude as in `PosePID` [1], velocity over ground [m/s] and angular velocity [rad/s] in body axes.
 
     Args:
         K: Gains (6, 12) [N, N m per unit of x].

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Guidance by a trajectory in time."""
+"""Guidance along a trajectory in time."""
 
 from __future__ import annotations
 
@@ -23,17 +23,18 @@ FASTEST = 1e15
 class Trajectory(Guidance):
     """Wanted position over time, with velocity and heading rate as feedforward.
 
-    Before the first time and after the last one, the vehicle shall be at rest at the first place and at the last one.
+    Before the first time, the vehicle is to be at rest at the first position; after the last time, at the last position.
 
     Args:
         times: Times (k,) [s], rising, at least two.
         positions: Wanted positions (k, 3) [m], inertial axes.
-        headings: Wanted headings (k,) [rad]; from each to the next the short way round. Not wanted by default.
-        speed: Wanted speeds ahead through the water (k,) [m/s]; by default the size of the wanted velocity. Straight from one
-            to the next, or in steps, too.
-        interpolation: "linear", the default: straight from place to place; or "cubic": by natural cubic splines, whose
-            velocities have no jumps within the times; or "steps": set-points, each wanted from its time to the next one, at
-            rest.
+        headings: Wanted headings (k,) [rad]; the heading turns the short way from each to the next. By default no heading is
+            wanted.
+        speed: Wanted forward speeds through the water (k,) [m/s]; by default the size of the wanted velocity. Between times
+            they are interpolated linearly, or held with "steps".
+        interpolation: "linear", the default, uses straight lines between positions. "cubic" uses natural cubic splines, whose
+            velocities are continuous between the first and the last time. "steps" holds each position, at rest, until the
+            next time.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -95,7 +96,7 @@ class Trajectory(Guidance):
 
 
 def _pieces(t: np.ndarray, values: np.ndarray, interpolation: str) -> np.ndarray:
-    """Rows (1, k, 21): time, and four coefficients of each of five numbers, lowest power first. The last piece is at rest."""
+    """Rows (1, k, 21): time and four coefficients of each of five numbers, lowest power first. The last row is at rest."""
     k, d = values.shape
     coefficients = np.zeros((k, 4, d))
     coefficients[:, 0] = values

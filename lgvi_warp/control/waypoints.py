@@ -30,37 +30,38 @@ OF_POINTS = ("times", *CIRCLES)
 class Waypoints(Guidance):
     """Waypoints joined by straight legs; the heading follows by line of sight (Fossen 2021, 12.3-12.5).
 
-    With y the distance to starboard of the leg and D the look-ahead, the wanted heading is that of the leg minus
+    Let y be the distance to starboard of the leg and D the look-ahead. The wanted heading is the leg's heading minus an angle:
     "los": atan(y / D);
-    "ilos": atan((y + kappa J) / D), where J gains D y / (D^2 + (y + kappa J)^2) a second (Borhaug, Pavlov & Pettersen 2008);
-    "alos": beta + atan(y / D), where the estimate beta of the crab angle gains gamma D y / sqrt(D^2 + y^2) a second (Fossen &
-    Aguiar 2024).
+    "ilos": atan((y + kappa J) / D), where dJ/dt = D y / (D^2 + (y + kappa J)^2) (Borhaug, Pavlov & Pettersen 2008);
+    "alos": beta + atan(y / D), where beta is an estimate of the crab angle with d beta/dt = gamma D y / sqrt(D^2 + y^2)
+    (Fossen & Aguiar 2024).
 
-    Wanted depth and position are those of the point of the leg abeam of the vehicle. A leg is done when the vehicle is within
-    the radius of its end, or abeam of it.
+    Wanted depth and position are those of the point of the leg that is abeam of the vehicle. A leg is done when the vehicle
+    is within the radius of the leg's end or abeam of the end.
 
     Args:
-        points: The points, (k, 3) [m], inertial axes: at least two; neighbours must differ in north or east.
-        geodetic: The points as latitude, longitude [deg, WGS 84] and depth [m], (k, 3), in place of `points`; the scene's
-            environment must have an origin. Legs are straight in the plane of its axes. `points` vary, not `geodetic`.
-        speed: Wanted speed ahead through the water [m/s]; with `times` the largest speed.
-        look_ahead: D [m].
+        points: Waypoints, (k, 3) [m], inertial axes: at least two; neighbours must differ in north or east.
+        geodetic: Waypoints as latitude, longitude [deg, WGS 84] and depth [m], (k, 3), in place of `points`. The scene's
+            environment must have an origin. Legs are straight in the plane of its axes. Only `points` can vary by member.
+        speed: Wanted forward speed through the water [m/s]; with `times`, the largest wanted speed.
+        look_ahead: Look-ahead distance D [m].
         radius: Radius of acceptance [m], horizontal.
         method: "los", "ilos" or "alos"; by default "los".
         kappa: Gain of "ilos" [1/s]; 0.1 by default.
         gamma: Gain of "alos" [rad/(m s)]; 0.002 by default.
-        at_end: Behaviour at the last point: "stop", the default: heading of the last leg, speed 0, the point as wanted
-            position; "go_on": along the last leg beyond its end; or "loiter": on a circle about the point.
-        times: Arrival time at each point, (k,) [s], rising. Before the first time the speed is 0. By default there are no
-            times.
-        loiter_radius: Radius [m] of the circles about points.
-        loiter_turns: Number of turns about each point, (k,), 0 at the first; by default none.
-        loiter_time: Least time on the circle about each point, (k,) [s], 0 at the first; by default none.
-        clockwise: Whether circles go clockwise as seen from above; by default True.
+        at_end: Behaviour at the last point. With "stop", the default, the wanted heading is that of the last leg, the wanted
+            speed 0 and the wanted position the last point. With "go_on", the vehicle continues along the last leg beyond its
+            end. With "loiter", it circles the last point.
+        times: Arrival time at each point, (k,) [s], rising. Before the first time the wanted speed is 0. By default there are
+            no times.
+        loiter_radius: Radius [m] of circles about points.
+        loiter_turns: Number of turns about each point, (k,), 0 at the first; by default no turns.
+        loiter_time: Least time on the circle about each point, (k,) [s], 0 at the first; by default no time.
+        clockwise: Whether the vehicle circles clockwise as seen from above; by default True.
 
     Raises:
-        SceneError: If the points do not form a path, times do not rise, or only one of circles and their radius is given;
-            or a number is invalid (see `Term`).
+        SceneError: If the points do not form a path, times do not rise, circles are given without their radius or the radius
+            without circles, or a number is invalid (see `Term`).
 
     Examples:
         >>> import lgvi_warp as lw
@@ -109,7 +110,7 @@ class Waypoints(Guidance):
         self._check_circles(faults)
 
     def _check_circles(self, faults: Faults) -> None:
-        """Note circles without a radius and the reverse, those about the first point, and one that never ends."""
+        """Add faults if only circles or only their radius is given, or a circle is at the first or before an endless leg."""
         asked = {name: getattr(self, name) for name in CIRCLES if getattr(self, name) is not None}
         circling = bool(asked) or self.at_end == "loiter"
         if circling and self.loiter_radius is None:
@@ -159,7 +160,7 @@ class Waypoints(Guidance):
 
     @property
     def circles(self) -> bool:
-        """Whether it circles about some point."""
+        """Whether the path has a circle about some point."""
         return self.loiter_radius is not None
 
     @property
@@ -190,7 +191,7 @@ class Waypoints(Guidance):
 
 
 def _check_way(faults: Faults, name: str, points: np.ndarray) -> None:
-    """Note what is no way: a single point, and one at the place of the map of the one before."""
+    """Add a fault for points that form no path: a single point, or neighbours with the same north and east."""
     if len(points) < 2:
         faults.add(name, points, "are less than two", "give where the way begins and where it ends")
     for i in np.flatnonzero(np.all(np.diff(points[:, :2], axis=0) == 0.0, axis=1)):

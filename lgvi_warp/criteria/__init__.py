@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Criteria that a study applies to members: kept metrics, success, risk; answers in files."""
+"""Criteria that a study applies to members: stored metrics, success, risk; files of answers."""

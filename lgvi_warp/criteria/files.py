@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Write what a study found as files for other programs."""
+"""Write the results of a study to files for other programs."""
 
 from __future__ import annotations
 
@@ -40,12 +40,12 @@ _STUDY_FILES = {
 
 
 def study_files() -> dict[str, str]:
-    """Patterns of the names of the files of each study, those of extensions too."""
+    """Patterns of each study's file names, including the studies of extensions."""
     return _STUDY_FILES | {word: f"{word}.json" for word in extensions.words("studies")}
 
 
 def finite_or_none(value: Any) -> Any:
-    """Numbers, texts, and dicts, lists and arrays of them with None for what is not finite, as JSON can hold them."""
+    """Convert numbers, texts, dicts, lists and arrays to JSON types; numbers that are not finite become None."""
     if isinstance(value, dict):
         return {key: finite_or_none(item) for key, item in value.items()}
     if isinstance(value, np.ndarray):
@@ -58,7 +58,7 @@ def finite_or_none(value: Any) -> Any:
 
 
 def with_missing_as(value: Any, missing: float) -> Any:
-    """Undo `finite_or_none`: a number, infinite or NaN, in place of None."""
+    """Undo `finite_or_none`: replace None by `missing`, which is infinite or NaN."""
     if isinstance(value, dict):
         return {key: with_missing_as(item, missing) for key, item in value.items()}
     if isinstance(value, list):
@@ -67,25 +67,25 @@ def with_missing_as(value: Any, missing: float) -> Any:
 
 
 def of_study(path: str | os.PathLike[str]) -> AbstractContextManager[None]:
-    """Turn what the content of a study's file raises in the `with` block into a fault of the file."""
+    """Turn exceptions that a study file's content raises in the `with` block into a SceneError about the file."""
     return corrupt_file_as_scene_error(path, "of another version", "run the study again")
 
 
 @explained
 class Saved(ABC):
-    """Answer of a study, as content of a JSON file and as records of a CSV file.
+    """Base class of the answers of studies, which are written to JSON, CSV and other files.
 
     Attributes:
         study: name of the study, and of its files.
-        endings: of its files, in the order in which they are written; "txt" is what `str` tells.
+        endings: endings of its files, in the order of writing; the "txt" file has the text of `str`.
 
     Methods:
         save: Write the files into a folder.
-        load: Read the JSON file.
+        load: Read the answer from the JSON file.
         rows: Records of the CSV file.
-        to_csv: Write the CSV file alone.
-        to_json: The JSON text.
-        to_dict: The content of the JSON file.
+        to_csv: Write only the CSV file.
+        to_json: Convert the answer to a JSON text.
+        to_dict: Convert the answer to the content of the JSON file.
         from_dict: Build the answer from this content.
     """
 
@@ -99,22 +99,22 @@ class Saved(ABC):
     @property
     @abstractmethod
     def answer(self) -> str:
-        """The answer in one sentence, in the words of the question; `str` ends with it."""
+        """The answer in one sentence, which repeats the question; the text of `str` ends with it."""
 
     def to_dict(self) -> dict[str, Any]:
-        """Convert it to plain types for JSON.
+        """Convert the answer to plain types for JSON.
 
         Returns:
-            The answer in one sentence, and the content; numbers that are not finite are None.
+            A dict with the answer in one sentence and the content. Numbers that are not finite are None.
         """
         return {"answer": self.answer} | self._content()
 
     @abstractmethod
     def _content(self) -> dict[str, Any]:
-        """Content of the JSON file but for the answer."""
+        """Content of the JSON file without the sentence of the answer."""
 
     def _report(self) -> Iterable[str]:
-        """Lines of text above the answer; none by default."""
+        """Lines of text above the answer's sentence; none by default."""
         return ()
 
     def __str__(self) -> str:
@@ -122,14 +122,14 @@ class Saved(ABC):
 
     @abstractmethod
     def rows(self) -> Iterable[dict[str, Any]]:
-        """Flatten it to records.
+        """Flatten the answer to records.
 
         Returns:
             One record for each line of the CSV file.
         """
 
     def to_json(self) -> str:
-        """Convert it to a JSON text.
+        """Convert the answer to a JSON text.
 
         Returns:
             The text of `to_dict`; numbers that are not finite are null.
@@ -140,22 +140,22 @@ class Saved(ABC):
         """Write the rows to a CSV file.
 
         Args:
-            path: of the file.
+            path: path of the file.
 
         Returns:
             Path of the file.
 
         Raises:
-            OSError: if it cannot be written.
+            OSError: if the file cannot be written.
         """
         return write_csv(list(self.rows()), path)
 
     def save(self, folder: str | os.PathLike[str], name: str = "") -> list[Path]:
-        """Write a file of each ending, NAME.json and NAME.csv, into a folder, which is made if needed.
+        """Write one file for each ending, such as NAME.json and NAME.csv, into a folder, which is created if needed.
 
         Args:
-            folder: of the files.
-            name: their name without the ending. Default: that of the study, as "tradeoff".
+            folder: path of the folder.
+            name: file name without its ending. Default: name of the study, such as "tradeoff".
 
         Returns:
             Paths of the files.
@@ -175,34 +175,34 @@ class Saved(ABC):
 
     @classmethod
     def from_dict(cls, content: dict[str, Any]) -> Self:
-        """Build it from the content of a JSON file.
+        """Build the answer from the content of a JSON file.
 
         Args:
-            content: as `to_dict` returns it; the answer follows from the rest.
+            content: dict as returned by `to_dict`; the sentence of the answer is derived again.
 
         Returns:
-            What the study found; numbers that were not finite are infinite or NaN.
+            The answer of the study; None is read back as infinite or NaN.
         """
         return cls._of_content({name: value for name, value in content.items() if name != "answer"})
 
     @classmethod
     @abstractmethod
     def _of_content(cls, content: dict[str, Any]) -> Self:
-        """Build it from what `_content` returned."""
+        """Build the answer from the dict that `_content` returned."""
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Self:
-        """Read it from the JSON file that `save` wrote.
+        """Read the answer from the JSON file that `save` wrote.
 
         Args:
-            path: of the file, or of the folder with it.
+            path: path of the file, or of its folder.
 
         Returns:
-            What the study found.
+            The answer of the study.
 
         Raises:
             OSError: if the file cannot be read.
-            SceneError: if it is no regular file, is damaged, or of another version.
+            SceneError: if it is not a regular file, is damaged, or was written by another version.
         """
         own = f"{cls.study}.json" if hasattr(cls, "study") else ""
         if own and (folder := path_of("path", path)).is_dir() and folder.name != own:

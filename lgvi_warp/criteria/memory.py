@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Results of a study's calls in a folder, so that one that was interrupted goes on where it ended."""
+"""Store the results of a study's calls in a folder, so that an interrupted study can continue."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ NO_MATTER = ("threads", "executor", "scheduler")
 
 
 class Remembered:
-    """Calls of functions of arrays, each kept as the next numbered file of a folder: a call that is kept is not run again.
+    """Call functions of arrays, and store each call as a numbered file of a folder: a stored call is not run again.
 
-    store: the folder, made if needed; None keeps nothing.
-    fleets: what is run. asked: every other argument that the calls depend on.
+    store: the folder, created if needed; None stores nothing.
+    fleets: ensembles that are run. asked: all other arguments on which the calls depend.
     """
 
     def __init__(
@@ -48,13 +48,13 @@ class Remembered:
 
     @property
     def keeps(self) -> bool:
-        """Whether calls are kept."""
+        """True if calls are stored."""
         return self._folder is not None
 
     def __call__(self, name: str, run: Callable[..., Arrays], *arrays: np.ndarray) -> Arrays:
-        """Call a function of arrays, or read its stored return values; name: of the function.
+        """Call a function of arrays, or read its stored return values; name: name of the function.
 
-        Raises: SceneError, where the folder has another call in this place.
+        Raises: SceneError, if the folder has another call under this number.
         """
         if self._folder is None:
             return run(*arrays)
@@ -77,7 +77,7 @@ class Remembered:
         return self._folder / f"{number:06d}.npz"
 
     def _kept(self, number: int) -> dict[str, np.ndarray] | None:
-        """The content of a file; None where there is none, or it is torn. Raises SceneError: it is of other arguments."""
+        """Content of a file; None if it is missing or incomplete. Raises SceneError if it has other arguments."""
         try:
             arrays = of_npz(self._path(number))
         except (FileNotFoundError, ValueError):
@@ -91,7 +91,7 @@ class Remembered:
         return refusal("store", str(self._folder), problem, remedy)
 
     def _key(self, fleets: Sequence[Ensemble], requested: Mapping[str, Any]) -> str:
-        """Text that identifies the arguments. Raises SceneError where a function of the user's cannot be told from others."""
+        """Text that identifies the arguments. Raises SceneError if a user's function cannot be identified."""
         told = {f"[{i}] {place}": each for i, fleet in enumerate(fleets)
                 for place, each in identities(functions_of(fleet)).items()}  # fmt: skip
         told |= {name: identity(value) for name, value in requested.items() if name not in NO_MATTER}
@@ -103,7 +103,7 @@ class Remembered:
 
 
 def key_of(content: Mapping[str, Any]) -> str:
-    """A key for what decides a cell's numbers: 32 hexadecimal digits."""
+    """Key of all inputs that decide a cell's numbers: 32 hexadecimal digits."""
     text = json.dumps(content, sort_keys=True, default=_plain)
     return hashlib.sha256(text.encode()).hexdigest()[:32]
 

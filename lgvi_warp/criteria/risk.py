@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Risks: one cost of many members."""
+"""Risk measures: reduce the costs of many members to one number."""
 
 from __future__ import annotations
 
@@ -15,10 +15,11 @@ from lgvi_warp.common.errors import Faults, brief
 
 @dataclass(frozen=True)
 class CVaR:
-    """The mean of the worst part of the members (Rockafellar & Uryasev 2000).
+    """Conditional value at risk: mean cost of the worst members (Rockafellar & Uryasev 2000).
 
     Args:
-        share: The part, in (0, 1]; 0.05 for the worst 5 %. If its end falls within a member, that member counts in part.
+        share: Fraction of the members, in (0, 1]; 0.05 for the worst 5 %. If it is not a whole number of members, the
+            last member counts in part.
 
     Raises:
         SceneError: If the share is not in (0, 1].
@@ -41,7 +42,7 @@ class CVaR:
         faults.raise_if_any()
 
     def __call__(self, costs: np.ndarray) -> np.ndarray:
-        """The risk (k,) of costs (k, members); infinite where a member of the worst part has an infinite cost.
+        """The risk (k,) of costs (k, members); infinite if one of the worst members has an infinite cost.
 
         docs/theory/estimators.md, (E10).
         """
@@ -68,7 +69,7 @@ class _Risk:
 
 
 def risk_of(faults: Faults, risk: Any) -> Any:
-    """Read a risk, "mean", the level of a quantile, or a `CVaR`: a function of costs (k, members); the mean after a fault."""
+    """Read a risk: "mean", a quantile's level or a `CVaR`. Returns a function of costs (k, members)."""
     if isinstance(risk, CVaR):
         return risk
     if isinstance(risk, float) and 0.0 < risk < 1.0:

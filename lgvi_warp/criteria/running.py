@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Arguments of the runs of a study, and the time that they take in words."""
+"""Arguments of the runs of a study, and texts of durations."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from lgvi_warp.statistics.base import Statistic
 
 
 def kept(metrics: Mapping[str, Statistic], controller: Any) -> dict[str, Any]:
-    """The arguments of `solve` for what a run keeps whose metrics alone are wanted, all of them at ticks."""
+    """Arguments of `solve` for a run that stores only its metrics, all of them at ticks."""
     # Metrics come to ticks by themselves; expressions over the path are of the samples.
     by_samples = controller is not None and not all(metric.ticks for metric in metrics.values())
     save = SaveAt(every=float(controller.period) if by_samples else None, fields=())
@@ -22,7 +22,7 @@ def kept(metrics: Mapping[str, Statistic], controller: Any) -> dict[str, Any]:
 
 
 def step_of(scene: Any, h: float | None) -> float:
-    """The step of a study [s]; h: None for the scene's."""
+    """The step of a study [s]; h: the requested step, or None for the scene's step."""
     faults, step = Faults(), scene.run.step if h is None else h
     if step is None:
         faults.add("h", h, "is missing", "give the step in seconds: h=0.01, --step 0.01 or [run] step")
@@ -34,7 +34,7 @@ def step_of(scene: Any, h: float | None) -> float:
 
 
 def duration_text(seconds: float) -> str:
-    """A time [s] in words; NaN for one that was not kept."""
+    """Text of a duration [s]; NaN means that it was not recorded."""
     if np.isnan(seconds):
         return "time not kept"
     for unit, size in (("years", 3.15e7), ("days", 86400.0), ("hours", 3600.0), ("minutes", 60.0)):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Success of a member: conditions on how it ended and on its metrics, and the probability of it with its interval."""
+"""Success of a member: conditions on its final status and its metrics; probability of success with its interval."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ INTERVALS = ("wilson", "clopper_pearson")
 
 
 class Probability(NamedTuple):
-    """A probability, the fraction of the members, with its interval."""
+    """A probability (the fraction of the members) with its confidence interval."""
 
     value: float
     lower: float
@@ -29,7 +29,7 @@ class Probability(NamedTuple):
 
 
 def probability(hits: int, count: int, confidence: float, interval: str) -> Probability:
-    """The probability of what so many of `count` members do; interval: one of `INTERVALS`."""
+    """Probability of an event that `hits` of `count` members meet; interval: one of `INTERVALS`."""
     if interval == "wilson":
         ends = intervals.wilson(np.array(hits / max(count, 1)), np.array(count), confidence)
     else:
@@ -38,7 +38,7 @@ def probability(hits: int, count: int, confidence: float, interval: str) -> Prob
 
 
 def none_text(hits: int, count: int, confidence: float) -> str:
-    """Knowledge where all of `count` members passed, or none: a one-sided limit; "" where some did."""
+    """Text of the one-sided limit if all of `count` members passed, or none; "" if only some passed."""
     if not count or 0 < hits < count:
         return ""
     verb = "fails" if hits else "passes"
@@ -47,17 +47,17 @@ def none_text(hits: int, count: int, confidence: float) -> str:
 
 @dataclass(frozen=True)
 class Success:
-    """Conditions that a member must fulfil, all of them. A number that is NaN fulfils none; one that failed never passes.
+    """Conditions of success, all of which a member must fulfil. NaN fulfils no condition; a failed member never passes.
 
-    status: how it must end: "ok" (neither failed nor stopped), "not_failed", or a status such as "floor"; one of these.
-    limits: name of a metric -> (above, below), between which it lies.
+    status: accepted final statuses: "ok" (neither failed nor stopped), "not_failed", or an outcome such as "floor".
+    limits: name of a metric -> (above, below): lower and upper limit of its value.
     """
 
     status: tuple[str, ...] = (OK,)
     limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     def passed(self, status: np.ndarray, numbers: Mapping[str, np.ndarray]) -> np.ndarray:
-        """Mask of members that pass (n,), from their status (n,) and their metrics (n,) by name."""
+        """Mask of the members that pass (n,), from their statuses (n,) and their metrics, name -> (n,)."""
         ended = np.zeros(len(status), bool)
         known = {OK: status == 0, NOT_FAILED: ~failed(status)}
         for word in self.status:
@@ -76,7 +76,7 @@ class Success:
 
 
 def success_of(conditions: Any, metrics: Sequence[str]) -> Success:
-    """Read conditions: a `Success`, or {"status": "ok", "overshoot depth": {"below": 1.0}}; None for "ok" alone.
+    """Read conditions: a `Success`, or {"status": "ok", "overshoot depth": {"below": 1.0}}; None means "ok" only.
 
     metrics: names of the sweep's metrics.
     """

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Cost and error of a setting: trials, references, ladders of steps, speed."""
+"""Cost and error of a setting: trials, references, searches for the longest step, speed."""

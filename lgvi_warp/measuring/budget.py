@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Processor time that a search may spend: that of the thread which runs it, so that other programs take none of it away."""
+"""Budget of processor time for a search. Only the thread of the search counts, so other programs use none of it."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from collections.abc import Callable, Iterator
 
 
 class Budget:
-    """Processor time of this thread from now on, without what is free, such as compiling.
+    """Processor time of this thread from now on, except for blocks marked as free, such as compiling.
 
-    Searches run their members in the thread that asks, so its time is that of the run.
+    A search runs its members in the calling thread, so this thread's time is the time of the runs.
     """
 
     def __init__(self, seconds: float, clock: Callable[[], float] = time.thread_time):
@@ -25,12 +25,12 @@ class Budget:
 
     @property
     def over(self) -> bool:
-        """Whether all of it is spent."""
+        """True if the whole budget is spent."""
         return self.spent > self.seconds
 
     @contextlib.contextmanager
     def free(self) -> Iterator[None]:
-        """Leave out what runs in the `with` block."""
+        """Do not count the time of the `with` block."""
         begun = self._clock()
         try:
             yield
@@ -39,6 +39,6 @@ class Budget:
 
 
 def rounded_up(seconds: float) -> float:
-    """The next length of a search that is easy to say: 1, 2, 3, 5 or 10 times a power of ten [s]."""
+    """Round a duration up to 1, 2, 3, 5 or 10 times a power of ten [s]."""
     power = 10.0 ** math.floor(math.log10(seconds))
     return next(nice * power for nice in (1.0, 2.0, 3.0, 5.0, 10.0) if nice * power >= seconds * (1.0 - 1e-9))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Runs of a sample of an ensemble with different settings, and how far apart they are: members and statistics."""
+"""Runs of a sample of an ensemble with different settings, and differences of their members and statistics."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Candidate:
         h: step [s].
         dtype: precision, such as "float64" or "float32".
         solver: solver of equation (24): "quartic", "cayley", "newton" or "moser_veselov".
-        iterations: its Newton steps; None for as many as its tolerance needs.
+        iterations: number of the solver's Newton steps; None for as many as its tolerance needs.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -63,14 +63,14 @@ class Candidate:
 
     @property
     def name(self) -> str:
-        """Method and solver as a text, without step and dtype."""
+        """Text with method and solver, without step and dtype."""
         if self.plain:
             return self.method
         return f"{self.method} {self.solver}" + ("" if self.iterations is None else f" {self.iterations}")
 
     @property
     def text(self) -> str:
-        """Method, solver and dtype as a text, without step."""
+        """Text with method, solver and dtype, without step."""
         return f"{self.name} {self.dtype}"
 
     def options(self) -> dict[str, Any]:
@@ -95,19 +95,19 @@ class Candidate:
 
 
 class Sample:
-    """The first members of an ensemble from 0 to t1, at times that runs of every step have in common.
+    """The first members of an ensemble from 0 to t1, compared at times that all steps reach exactly.
 
-    Steps are spacing / m for whole m. The spacing is run.save_every of the scene where it divides t1, else t1 / samples.
-    Where noise acts on a grid, m divides the number of its draws in the spacing, so that all runs see one path.
+    Steps are spacing / m for whole m. The spacing is run.save_every of the scene if it divides t1, else t1 / samples.
+    If noise is drawn on a grid, m divides the number of draws in the spacing, so that all runs share one noise path.
 
-    samples: largest number of times after 0.
-    kernels: what compiles, runs and prices its plans.
-    whole, ensemble: all members, and those of the sample.
+    samples: maximum number of sample times after 0.
+    kernels: object that compiles and runs plans and measures their cost.
+    whole, ensemble: the fleet, and the members of the sample.
     spacing: a Fraction [s].
     index, times: the times as multiples of the spacing (k,), and in seconds (k,) [s].
     rate: largest angular rate at the start, at least one turn in t1 [rad/s].
-    draws: number of draws of noise in the spacing; 0 for runs that draw once a step.
-    fixed_draws: the most that the noise_steps of the scene allow; 0 where no term has one.
+    draws: number of noise draws in the spacing; 0 if runs draw once per step.
+    fixed_draws: largest number of draws that the noise_steps of the scene allow; 0 if no term has a noise_step.
     """
 
     def __init__(
@@ -142,7 +142,7 @@ class Sample:
         self.draws, self.fixed_draws = 0, self._fixed_draws()
 
     def more(self, members: int, times: int = 1) -> Sample:
-        """The same sample with more members, and so many times as many times."""
+        """The same sample with more members, and with `times` times as many sample times."""
         return Sample(self.whole, self.t1, members, self.samples * times, kernels=self.kernels)
 
     def on_grid(self, draws: int) -> Sample:
@@ -153,7 +153,7 @@ class Sample:
         return sample
 
     def _fixed_draws(self) -> int:
-        """The most draws in the spacing whose grid every noise_step of the scene divides; 0 where no term has one."""
+        """Largest number of draws in the spacing that fits every noise_step of the scene; 0 if no term has one."""
         faults, counts = Faults(), [0]
         for term in self.ensemble.scene.terms:
             if isinstance(term, NoisyTerm) and term.noise_step is not None:
@@ -167,13 +167,13 @@ class Sample:
         return math.gcd(*counts)
 
     def allowed(self, m: int) -> int:
-        """The next number of steps that noise on a grid allows."""
+        """The next number of steps, m or larger, that noise on a grid allows."""
         if not self.draws:
             return m
         return next((count for count in saveat.divisors(self.draws) if count >= m), self.draws)
 
     def coarsest(self, angle: float) -> int:
-        """The fewest steps of which none turns a member by more than an angle at the start [rad]."""
+        """The smallest number of steps at which no member turns by more than `angle` per step at the start [rad]."""
         return self.allowed(max(1, math.ceil(float(self.spacing) * self.rate / angle)))
 
     def h(self, m: int) -> float:
@@ -181,7 +181,7 @@ class Sample:
         return float(self.spacing / m)
 
     def candidate(self, method: str, m: int, dtype: str = "float64", solver: Any = ("quartic", None)) -> Candidate:
-        """A setting with the step spacing / m; solver: (name, iterations)."""
+        """Build a setting with the step spacing / m; solver: (name, iterations)."""
         return Candidate(method, self.h(m), dtype, *solver)
 
     def plan(self, candidate: Candidate, ensemble: Ensemble | None = None) -> Plan:
@@ -191,7 +191,7 @@ class Sample:
         return choose_plan(ensemble or self.ensemble, candidate.resolved(), grid, FIELDS, candidate.dtype)
 
     def plan_to_price(self, candidate: Candidate) -> Plan:
-        """Make the plan of a run of a setting outside the comparison."""
+        """Make the plan of a setting as it runs outside the comparison, to measure its cost."""
         sample = self.on_grid(round(float(self.spacing) / candidate.h)) if self.draws else self
         return sample.plan(candidate)
 
@@ -202,7 +202,7 @@ class Sample:
     def accepted(
         self, methods: Sequence[str], dtype: str = "float64", most: int | None = None
     ) -> tuple[list[str], dict[str, str]]:
-        """Sort methods into those that the scene takes, at most so many, and those that it refuses: name -> reason."""
+        """Sort methods into those that can run the scene, at most `most`, and those that cannot: name -> reason."""
         good, refused, tableaux = list[str](), dict[str, str](), dict[Any, str]()
         for name in methods:
             if len(good) == most:
@@ -220,7 +220,7 @@ class Sample:
         return good, refused
 
     def noise(self, method: str) -> str:
-        """Whether noise acts: "none"; "grid", where runs may share a path; or "free", whose path differs with the step."""
+        """Kind of noise: "none"; "grid", whose path runs may share; or "free", whose path differs with the step."""
         laws = self.plan(self.candidate(method, 1)).kernel_choice.laws
         noisy = [term for term, module in laws if getattr(module, "NOISE", False)]
         if not noisy:
@@ -229,7 +229,7 @@ class Sample:
 
 
 def drawn_every(fleet: Ensemble, noise_step: float, own_grid: bool = True) -> Ensemble:
-    """Put the noise of an ensemble on a grid, but for terms with a noise_step of their own where own_grid says so."""
+    """Draw the noise of an ensemble on a grid; if own_grid, terms with their own noise_step keep it."""
 
     def on_grid(term: Any) -> Any:
         noisy = isinstance(term, NoisyTerm) and not (own_grid and term.noise_step is not None)
@@ -241,12 +241,12 @@ def drawn_every(fleet: Ensemble, noise_step: float, own_grid: bool = True) -> En
 
 
 def failed(result: Result) -> bool:
-    """True if some member failed; those stopped by an event did not."""
+    """True if some member failed. Members stopped by an event did not fail."""
     return bool(failed_members(result.status).any())
 
 
 def distances(result: Result, reference: Result, distance: Distance | None = None) -> dict[str, np.ndarray]:
-    """Quantity -> distance of two results at each time (k, n); NaN from where an event stopped a member in either."""
+    """Quantity -> distance of two results at each time (k, n); NaN after an event stopped the member in one of them."""
     apart = {name: getattr(result, name).astype(np.float64) - getattr(reference, name) for name in FIELDS}
     chord = np.linalg.norm(apart.pop("attitude"), axis=(-2, -1))
     lengths = {name: np.linalg.norm(difference, axis=-1) for name, difference in apart.items()}
@@ -276,7 +276,7 @@ def errors(apart: dict[str, np.ndarray], until: int) -> dict[str, dict[str, floa
 
 
 def agreement(a: Result, b: Result, distance: Distance | None = None) -> dict[str, np.ndarray]:
-    """Quantity -> largest distance of two results up to each time (k,), over all members; infinite where a member failed."""
+    """Quantity -> largest distance of two results over all members, up to each time (k,); inf if a member failed."""
     if failed(a) or failed(b):
         names = dict.fromkeys([*QUANTITIES, *([distance.name] if distance else [])])
         return {name: np.where(a.time > 0.0, np.inf, 0.0) for name in names}
@@ -288,7 +288,7 @@ def agreement(a: Result, b: Result, distance: Distance | None = None) -> dict[st
 
 
 def quantities_of(result: Result, asked: Distance | None = None) -> dict[str, np.ndarray]:
-    """Quantity -> (k, n, components) that means and spreads are taken of; attitude: the vertical in body axes."""
+    """Quantity -> values (k, n, components) for means and standard deviations; attitude: the vertical in body axes."""
     values = {name: getattr(result, name).astype(np.float64) for name in ("position", "velocity", "angular_velocity")}
     values["attitude"] = result.attitude[..., 2, :].astype(np.float64)
     values["energy"] = result.energy[..., None]
@@ -302,9 +302,9 @@ def quantities_of(result: Result, asked: Distance | None = None) -> dict[str, np
 def biases(result: Result, reference: Result, distance: Distance | None = None) -> dict[str, float]:
     """Compare means and standard deviations of two results.
 
-    Each difference is in standard errors of the sample, as root mean square over components and times after 0. Two
-    independent samples of the same distribution differ by about 1.4.
-    Returns: "NAME_mean" and "NAME_std" -> difference; empty for one member or where one failed.
+    Each difference is measured in standard errors of the sample: its root mean square over components and times after
+    0. Two independent samples of the same distribution differ by about 1.4.
+    Returns: "NAME_mean" and "NAME_std" -> difference; empty if there is only one member or if a member failed.
     """
     n = result.members
     if n < 2 or failed(result):

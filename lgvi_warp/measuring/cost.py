@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Cost of a method's step on one core: CPU time of the thread that runs it, the least of several readings."""
+"""Cost of a method's step on one core: CPU time of the thread that runs it, the smallest of several readings."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ MOST_TOLD = 6
 
 @dataclass(frozen=True)
 class Cost:
-    """Cost of a setting; spread: median of the readings over the least, which is taken, near 1 on an idle machine."""
+    """Cost of a setting. spread: median reading divided by the smallest, which is the cost."""
 
     us_per_vehicle_second: float
     spread: float
@@ -40,7 +40,7 @@ def costs(
     plans: Sequence[Plan], rounds: int = 5, *, make: Callable[..., Packets] = Packets,
     clock: Callable[[], float] = thread_seconds, grows: Callable[[Plan], bool] | None = None,
 ) -> list[Cost]:  # fmt: skip
-    """Measure the cost of plans, in turn, with one number for all that run the same kernel."""
+    """Measure the cost of plans in turn; plans that run the same kernel share one number."""
     calls, steps = launches(plans, make=make, clock=clock)
     kinds = [Kind(plan.spec, plan.grid.h, (grows or work_grows)(plan)) for plan in plans]
     per_step = readings(kinds, lambda which: timed([calls[i] for i in which], rounds, clock=clock) / steps[which])
@@ -49,9 +49,9 @@ def costs(
 
 
 def readings(kinds: Sequence[Kind], read: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
-    """Read the cost of a step of each kind (kinds, rounds) [s], and again that of which no reading is near the least.
+    """Read the cost of a step of each kind (kinds, rounds) [s]; repeat kinds whose two smallest readings disagree.
 
-    read: from indices of kinds to readings of one step (indices, rounds) [s].
+    read: function from indices of kinds to readings of one step (indices, rounds) [s].
     """
     seconds = read(np.arange(len(kinds)))
     rounds = seconds.shape[1]
@@ -75,10 +75,10 @@ class Kind:
 
 
 def of_steps(kinds: Sequence[Kind], seconds: np.ndarray) -> list[tuple[float, float]]:
-    """Estimate the cost of a step of each kind [s] from all readings (kinds, rounds), and their median over the least.
+    """Cost of a step of each kind [s] from all readings (kinds, rounds), and their median divided by the smallest.
 
-    A step of one kernel is the same work whatever its length, and costs the least of all its readings. Where a longer
-    step is more work, it costs the least of the readings of steps as long or longer, each of which is at least its cost.
+    Most kernels do the same work in a step of any length; the cost is then the smallest of all readings of the kernel.
+    If a longer step is more work, only readings of steps as long or longer count, since none of them is below the cost.
     """
     prices = []
     for kind in kinds:
@@ -92,7 +92,7 @@ def of_steps(kinds: Sequence[Kind], seconds: np.ndarray) -> list[tuple[float, fl
 
 
 def confirmed(kinds: Sequence[Kind], seconds: np.ndarray) -> list[bool]:
-    """True for each kind of which a second reading came near the least one: then both are taken as undisturbed."""
+    """True for each kind whose second smallest reading is near its smallest: then both count as undisturbed."""
     met_again = []
     for kind in kinds:
         rising = np.sort(_bounding(kind, kinds, seconds), axis=None)  # NaN is last
@@ -101,7 +101,7 @@ def confirmed(kinds: Sequence[Kind], seconds: np.ndarray) -> list[bool]:
 
 
 def _bounding(kind: Kind, kinds: Sequence[Kind], seconds: np.ndarray) -> np.ndarray:
-    """The readings of which none can be below the kind's cost."""
+    """The readings that cannot be below the kind's cost."""
     bounds_it = [candidate.kernel == kind.kernel and (not kind.grows or candidate.h >= kind.h) for candidate in kinds]
     return np.asarray(seconds[np.array(bounds_it)])
 
@@ -109,7 +109,7 @@ def _bounding(kind: Kind, kinds: Sequence[Kind], seconds: np.ndarray) -> np.ndar
 def launches(
     plans: Sequence[Plan], *, make: Callable[..., Packets] = Packets, clock: Callable[[], float] = thread_seconds
 ) -> tuple[list[Callable[[], object]], np.ndarray]:
-    """Prepare one launch of each plan that is long enough to time, and the steps times vehicles that it makes (plans, 1)."""
+    """Prepare a launch of each plan, long enough to time, and its number of steps times vehicles (plans, 1)."""
     calls: list[Callable[[], object]] = []
     steps = np.empty((len(plans), 1))
     for i, plan in enumerate(plans):
@@ -148,8 +148,8 @@ def in_turn(calls: Sequence[Callable[[], object]], rounds: int, clock: Callable[
 def work_grows(plan: Plan) -> bool:
     """True if a longer step is more work.
 
-    That is where a step iterates to a tolerance (the quartic's few Newton steps aside), where each packet chooses its own
-    steps, and where a step takes several draws of noise.
+    This holds if a step iterates to a tolerance (except for the quartic's few Newton steps), if each packet chooses its
+    own steps, or if a step takes several draws of noise.
     """
     spec, letters = plan.spec, {letter for letter, _ in plan.spec.maps}
     newton = spec.explicit is None and spec.adaptive and (spec.solver != "quartic" or "W" in letters)
@@ -158,7 +158,7 @@ def work_grows(plan: Plan) -> bool:
 
 
 def disagreement(spreads: Sequence[tuple[str, float]]) -> str | None:
-    """The message about settings, (name, median of the readings over the least), whose readings of cost disagree."""
+    """Message about settings whose cost readings disagree; spreads: (name, median divided by the smallest reading)."""
     worst: dict[str, float] = {}
     for name, spread in spreads:
         if spread > DISAGREE:

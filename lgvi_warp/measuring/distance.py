@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The quantity that two results are compared in: any that statistics know, with its unit and its distance."""
+"""The quantity in which two results are compared, with its unit and its distance."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ QUANTITIES = {name: TABLE[name].unit for name in (*FIELDS, "energy")} | {"attitu
 
 @dataclass(frozen=True)
 class Distance:
-    """Quantity that errors are measured in.
+    """Quantity in which errors are measured.
 
-    functional: computes its numbers at each time; None for those of QUANTITIES.
-    mean: whether the error is that of its mean over the members, in place of the largest of any member.
+    functional: computes the quantity at each time; None for the names in QUANTITIES.
+    mean: True if the error is the error of the mean over the members, False for the largest error of a member.
     """
 
     name: str
@@ -41,10 +41,10 @@ class Distance:
         return self.functional(*samples_of(result))
 
     def distance(self, result: Result, reference: Result) -> np.ndarray:
-        """Length of the difference of two results (k, n) [unit]; of angles [rad] the short way round.
+        """Length of the difference of two results (k, n) [unit]; angles differ by the shorter way round [rad].
 
-        Of a mean, for every member alike, the upper end of the 95 % interval of the difference of the means, whose members are
-        paired.
+        For a mean, it is the upper end of the 95 % interval of the difference of the means, the same for every member.
+        The members of both results are paired.
         """
         with np.errstate(invalid="ignore"):
             apart = self.values(result) - self.values(reference)
@@ -60,7 +60,7 @@ class Distance:
 
 
 def _bias(apart: np.ndarray) -> np.ndarray:
-    """Length of the mean of paired differences (k, n, components) and of two standard errors of it, (k,)."""
+    """Length (k,) of |mean| plus two standard errors, per component, of paired differences (k, n, components)."""
     n = apart.shape[1]
     error = 2.0 * apart.std(axis=1, ddof=1) / np.sqrt(n) if n > 1 else np.zeros(apart[:, 0].shape)
     return np.asarray(np.linalg.norm(np.abs(apart.mean(axis=1)) + error, axis=-1))

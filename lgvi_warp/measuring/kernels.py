@@ -16,11 +16,11 @@ class Kernels:
     """Compiles, runs and prices plans with this machine's kernels, in this thread."""
 
     def compile(self, plan: Plan) -> float:
-        """Load the kernel of a plan; returns how long that took [s]."""
+        """Load the kernel of a plan; returns the time that loading took [s]."""
         return plan.compile()
 
     def run(self, plan: Plan) -> Result:
-        """Run a plan in this thread, whose processor time is then the run's."""
+        """Run a plan in this thread, so that the thread's processor time is the run's."""
         return run_plan(plan, 1, executor=ThisThread())
 
     def clock(self) -> float:

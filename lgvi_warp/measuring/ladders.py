@@ -38,11 +38,11 @@ class Ladders:
     """A search for the longest step of each method and precision that keeps the target.
 
     Each method runs one coarse step first. Then the steps are halved in turn until the error is below the target, and
-    lengthened by the slope of the errors. A method is given up where its steps cost twice what the cheapest setting so far
-    does, and a precision where the other one is better.
+    lengthened by the slope of the errors. A method is dropped if its steps cost twice as much as the cheapest setting
+    so far, and a precision is dropped if the other one is better.
 
     priced: (microseconds of one core per vehicle and second, trial) of each setting that keeps the target.
-    looked_at: names of the methods that ran a step, or whose steps cost too much for one.
+    looked_at: names of the methods that ran a step, or whose steps were too expensive to run.
     """
 
     def __init__(
@@ -59,7 +59,7 @@ class Ladders:
         self._compiled = {sample.plan(sample.candidate(name, 1)).spec for name in reference.methods}
 
     def climb(self, methods: Sequence[str], report: Callable[[float], None] = void, new_kernels: bool = True) -> None:
-        """Search some methods: a step of each in turn."""
+        """Search the longest steps of some methods; each runs one step in turn."""
         dtypes = sorted(self.dtypes)
         specs = {(method, dtype): self.sample.plan(self.sample.candidate(method, 1, dtype)).spec
                  for method in methods for dtype in dtypes}  # fmt: skip
@@ -78,7 +78,7 @@ class Ladders:
     def _method(
         self, method: str, dtypes: Sequence[str], specs: dict[tuple[str, str], Any], new_kernels: bool
     ) -> Generator[Trial | str, None, None]:
-        """Search the precisions of a method, one after the other; yields where the next method may take its turn."""
+        """Search the precisions of a method, one after the other; yields when it is the next method's turn."""
         known: dict[str, float | None] = {}
         for dtype in dtypes:
             if known:
@@ -96,7 +96,7 @@ class Ladders:
     def longest(self, method: str, dtype: str) -> Generator[Trial, None, float | None]:
         """Find the longest step that keeps the target, and its cost [us of one core per vehicle and second].
 
-        Infinite where such steps are too dear, None where the errors cease to fall.
+        The cost is infinite if such steps are too expensive, None if the errors no longer fall.
         """
         sample, reference, of, target = self.sample, self.reference, self.of, self.target
         m, before, worse = sample.coarsest(2.0), math.inf, 0
@@ -130,7 +130,7 @@ class Ladders:
 
     @property
     def limited_by_damping(self) -> bool:
-        """True if the cheapest setting's step is no longer small beside the fastest damping, or if there is none."""
+        """True if no setting is found, or if the cheapest setting's step is not small against the fastest damping."""
         trials = self.cheapest()
         return not trials or h_rates(rates(self.sample.ensemble), trials[0].candidate.h)["drag"] > STIFF
 
@@ -147,7 +147,7 @@ def step_cost(plan: Plan, kernels: Kernels) -> float:
 def lengthened(
     sample: Sample, good: Trial, m: int, before: float, reference: Reference, of: str, target: float
 ) -> Trial:
-    """Lengthen a step towards twice its length, whose error is `before`, as far as the target allows."""
+    """Lengthen a step as far as the target allows, to less than twice its length, where the error is `before`."""
     low, high, size = m // 2, m, good.error(of)
     if not math.isfinite(before) or before <= target or low < 1:
         return good

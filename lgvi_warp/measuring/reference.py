@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reference of errors: two precise runs that agree; and how fast small differences grow."""
+"""Reference of errors (two precise runs that agree), and growth of small differences."""
 
 from __future__ import annotations
 
@@ -36,13 +36,13 @@ STEEPEST = 3.0
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """Reference of errors: the finer of two runs that share no step and, at best, no method.
+    """Reference of errors: the finer of two runs with different steps and, if possible, different methods.
 
-    text: the two methods and their steps, in words.
-    own: quantity -> (k,), largest difference of the two runs over the members and up to each time [its unit].
-    asked: quantity of the errors, where it is none of QUANTITIES.
-    more: where the time was over before the runs agreed, about how much would have done [s]; infinite where it cannot be
-        told. 0 where they agree no better however long they run.
+    text: description of the two methods and their steps.
+    own: quantity -> (k,), largest difference of the two runs over all members up to each time [its unit].
+    asked: quantity of the errors, if it is not in QUANTITIES.
+    more: predicted time that would have sufficed, if the time was spent before the runs agreed [s]; infinite if no
+        prediction is possible; 0 if the runs do not agree better with more time.
     """
 
     result: Result
@@ -54,7 +54,7 @@ class Reference:
     more: float = 0.0
 
     def error(self, of: str, until: int = -1) -> float:
-        """The reference's own error: the largest difference of the two runs up to a sample."""
+        """The reference's own error: the largest difference of the two runs up to the sample `until`."""
         return float(self.own[of][until])
 
     def reaches(self, of: str, error: float) -> int:
@@ -63,9 +63,9 @@ class Reference:
 
 
 def extrapolated(sample: Sample, method: str, m: int) -> Result:
-    """Run a method; where its order is below four and no noise acts, extrapolate from three steps.
+    """Run a method; if its order is below four and no noise acts, extrapolate from three steps.
 
-    Richardson's extrapolation of the steps h, h/2 and h/4 takes out the terms in h^2 and h^3.
+    Richardson extrapolation from the steps h, h/2 and h/4 removes the error terms in h^2 and h^3.
     """
     if Method(method).order >= 4 or sample.draws:
         return sample.run(sample.candidate(method, m))
@@ -88,10 +88,10 @@ def make_reference(
     sample: Sample, of: str | Distance = "position", goal: float = 0.0, seconds: float = 15.0,
     methods: Sequence[str] | None = None, report: Callable[[float], None] | None = None,
 ) -> Reference:  # fmt: skip
-    """Refine two high-order runs together until they agree to a goal, agree no better, or the time is spent.
+    """Refine two high-order runs together until they agree to a goal, no longer agree better, or the time is spent.
 
-    Where noise acts, both see one path, drawn at each step of the finer run. Each refinement has a path of its own, and that
-    of the best one is the path of `Reference.sample`. How well the runs agree is for the caller to judge.
+    If noise acts, both runs share one path, drawn at each step of the finer run. Each refinement draws another path;
+    `Reference.sample` has the path of the best refinement. The caller judges whether the runs agree well enough.
 
     seconds: processor time to spend, without compiling [s].
     """
@@ -153,9 +153,9 @@ def make_reference(
 
 
 def more_seconds(error: float, goal: float, gain: float, last: float) -> float:
-    """Predict the processor time of refining two runs to a goal [s]; infinite where it cannot be told.
+    """Predict the processor time of refining two runs to a goal [s]; infinite if no prediction is possible.
 
-    last: that of the last two runs; each refinement takes twice as long as the one before.
+    last: processor time of the last two runs [s]; each refinement takes twice as long as the one before.
     """
     if not (math.isfinite(error) and goal > 0.0 and 1.5 < gain < math.inf):
         return math.inf
@@ -164,7 +164,7 @@ def more_seconds(error: float, goal: float, gain: float, last: float) -> float:
 
 
 def time_over(seconds: float, more: float, share: float) -> tuple[str, str]:
-    """Say that the time of a search was over, and how much would do: (cause, remedy)."""
+    """Text that the time of a search was over, and which time would suffice: (cause, remedy)."""
     cause = f"{seconds:g} s were over"
     if not math.isfinite(more):
         return cause, "give more seconds"
@@ -176,13 +176,14 @@ class Growth:
     """Growth of a small difference between two starts.
 
     Attributes:
-        rate: growth rate of its logarithm, by least squares [1/s].
-        doubling: ln 2 / rate [s]; infinite where growth is no exponential.
-        power: exponent p of the fit t^p, where it fits better than an exponential; else None.
-        factor: growth over the whole run.
-        predictable: dtype -> time at which one round-off has grown to 1e-2, extrapolated beyond the run [s]; may be infinite.
+        rate: slope of the logarithm of the difference over time, by least squares [1/s].
+        doubling: time in which the difference doubles, ln 2 / rate [s]; infinite if growth is not exponential.
+        power: exponent p of the fit t^p, if it fits better than an exponential; else None.
+        factor: factor of growth over the whole run.
+        predictable: dtype -> time at which round-off has grown to 1e-2, extrapolated if needed [s]; may be infinite.
         times: times of the curve (k,) [s].
-        curve: growth (k,): root mean square over the members of position [m] and attitude [rad].
+        curve: growth factor (k,) of the difference: root mean square over members, of position [m] and attitude [rad]
+            together.
     """
 
     rate: float

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Speed of the kernel on this machine, next to the peak of the core measured in the same run."""
+"""Speed of the kernel on this machine, compared with the core's peak speed, measured in the same run."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def example() -> Scene:
 
 
 def fleet(members: int, *terms: Term) -> Ensemble:
-    """Members around the example, whose angular velocities vary by 10 %."""
+    """Ensemble of the example with angular velocities that vary by 10 %."""
     from lgvi_warp.sampling.distributions.basic import Normal
 
     return Ensemble(
@@ -50,7 +50,7 @@ def fleet(members: int, *terms: Term) -> Ensemble:
 
 
 def stepper(plan: Plan, *, make: Callable[..., Packets] = Packets) -> Callable[[], None]:
-    """Prepare a call that makes all steps of a plan on one thread, without samples and set-up."""
+    """Prepare a call that makes all steps of a plan on one thread, without samples and preparation."""
     plan.compile()
     packets = make(plan, plan.ensemble.select(0, plan.ensemble.members))
     return lambda: void(packets.advance(0, plan.grid.steps))
@@ -63,7 +63,7 @@ def void(_: Any) -> None:
 def least(
     calls: Sequence[Callable[[], None]], rounds: int = 15, *, clock: Callable[[], float] = time.perf_counter
 ) -> list[float]:
-    """Least wall time of calls in turn [s]: other work on the machine can only lengthen a reading."""
+    """Smallest wall time of each of several calls, timed in turn [s]; other programs can only lengthen a reading."""
     return [min(seconds) for seconds in in_turn(calls, rounds, clock)]
 
 
@@ -71,7 +71,7 @@ def measure(
     members: int = 4096, steps: int = 1000, *, prepare: Callable[[Plan], Callable[[], None]] = stepper,
     timed: Callable[[Sequence[Callable[[], None]]], list[float]] = least, peak_of: Callable[[str], float] = fma_peak,
 ) -> Iterator[str]:  # fmt: skip
-    """Measure psi_s in both precisions next to the peak of the core."""
+    """Measure psi_s in both precisions, and the core's peak speed."""
     for dtype in ("float64", "float32"):
         plan = make_plan(fleet(members), "psi_s", h=0.01, t1=0.01 * steps, dtype=dtype)
         seconds = timed([prepare(plan)])[0] / (members * steps)
@@ -79,7 +79,7 @@ def measure(
 
 
 def record(plan: Plan, seconds: float, peak: float, operations: int | None) -> dict[str, Any]:
-    """Describe one measurement of a kernel, `seconds` a vehicle and step, next to the core's peak [1/s]."""
+    """Record of one measurement of a kernel, `seconds` per vehicle and step, with the core's peak [1/s]."""
     return {
         "method": plan.method.name,
         "dtype": plan.dtype,

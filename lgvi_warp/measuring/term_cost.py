@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Cost of a member's step with each term of a scene, beside the bare one."""
+"""Cost of a member's step with each term of a scene, compared with a step without terms."""
 
 from __future__ import annotations
 
@@ -32,20 +32,20 @@ def term_cost(
 ) -> list[dict[str, Any]]:
     """Measure the cost of a step without terms, with each term of a scene alone, and with all of them.
 
-    The scenes take turns. Costs are processor time of the thread that runs the kernel, the least of several readings.
-    Controllers and events are left out. Each kernel is compiled once, which takes some seconds.
+    The scenes are timed in turn. A cost is the smallest of several readings of the processor time of the thread that
+    runs the kernel. Controllers and events are left out. Each kernel is compiled once, which takes some seconds.
 
     Args:
         scene: The scene.
-        method: Name of the method, or a Method; default the one that the whole scene runs by.
+        method: Name of the method, or a Method; default the method that runs the whole scene.
         h: Step [s]; default `run.step` of the scene.
-        dtype: "float64", "float32" or "float32_compensated"; default that of the scene.
-        members: Number of vehicles that step together; default 64.
+        dtype: "float64", "float32" or "float32_compensated"; default the scene's precision.
+        members: Number of vehicles in the timed run; default 64.
         rounds: Number of readings of each scene; default 5.
 
     Returns:
-        A row for each scene: "term", "method", "dtype", "ns_per_vehicle_step" [ns], and "more_than_none" [ns], what it costs
-        more than the scene without terms.
+        A row for each scene: "term", "method", "dtype", "ns_per_vehicle_step" [ns], and "more_than_none" [ns], the
+        additional cost compared with the scene without terms.
 
     Raises:
         SceneError: The scene has no terms, or an argument is at fault.
@@ -74,7 +74,7 @@ def term_cost(
 def plans_of_terms(
     scene: Scene, members: int, method: str | Method | None, h: float | None, dtype: str | None
 ) -> dict[str, Plan]:
-    """Plan ten steps of a scene without terms, with each alone and with all, by the method that the whole scene runs by.
+    """Plan ten steps of a scene without terms, with each term alone and with all terms, by the whole scene's method.
 
     Controllers and events are left out.
     """
@@ -91,7 +91,7 @@ def plans_of_terms(
 
 
 def priced(plans: Mapping[str, Plan], prices: Sequence[Cost]) -> list[dict[str, Any]]:
-    """The rows of `term_cost` of plans by name, of which the first is the scene without terms."""
+    """Rows of `term_cost`; plans: name -> plan, the first without terms."""
     nanoseconds = [
         1e3 * price.us_per_vehicle_second * plan.grid.h for price, plan in zip(prices, plans.values(), strict=True)
     ]

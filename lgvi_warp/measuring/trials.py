@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Settings that are tried on a sample: every method at steps that are halved in turn, until that is worth no more."""
+"""Trial runs of settings on a sample: the steps of every method are halved in turn while this gains accuracy."""
 
 from __future__ import annotations
 
@@ -36,8 +36,8 @@ HOPELESS = 10.0
 class Trial:
     """A setting that was run on a sample.
 
-    plan: by which its cost is measured: noise without a noise_step of the scene is drawn once a step.
-    errors: quantity -> kind -> error; empty where a member failed or there is no reference.
+    plan: plan by which its cost is measured; noise without a noise_step is drawn once per step.
+    errors: quantity -> kind -> error; empty if a member failed or there is no reference.
     cpu_seconds: processor time of the run, without compiling [s].
     """
 
@@ -48,14 +48,14 @@ class Trial:
     cpu_seconds: float
 
     def error(self, of: str) -> float:
-        """The largest error over members and path; infinite where a member failed or there is no reference."""
+        """The largest error over members and path; infinite if a member failed or there is no reference."""
         return self.errors[of]["path_max"] if self.errors else math.inf
 
 
 def tried(
     sample: Sample, candidate: Candidate, reference: Reference | None, until: int = -1, budget: Budget | None = None
 ) -> Trial:
-    """Run a setting on a sample, compile outside the budget, and measure its errors against the reference, if any."""
+    """Run a setting on a sample and measure its errors against the reference, if any. Compiling is not budgeted."""
     plan = sample.plan(candidate)
     with budget.free() if budget else contextlib.nullcontext():
         compile_seconds = sample.kernels.compile(plan)
@@ -77,8 +77,8 @@ class StepSeries:
     """Steps of one setting, each half of the one before.
 
     m: number of steps in the sample's spacing.
-    best: least error of the steps so far, the larger of position [m] and attitude [rad].
-    worse: number of steps in a row that gained little.
+    best: smallest error of the steps so far; the error is the larger of position [m] and attitude [rad].
+    worse: number of successive steps with little gain.
     """
 
     method: str
@@ -99,11 +99,11 @@ def trials_of(
     report: Callable[[float], None], named: bool = False, *,
     solvers: Sequence[tuple[str, int | None]] | None = None, compensated: Sequence[str] | None = None,
 ) -> tuple[list[Trial], list[str]]:  # fmt: skip
-    """Run every method, precision and solver: each at a coarse step first, then in turn at half the step before.
+    """Run every method, precision and solver: each first at a coarse step, then in turn at half its last step.
 
-    whole: of the study, compiling included: once it is over, nothing is compiled that is not asked for by name.
-    named: whether the methods were asked for by name: then each begins, however long its kernel compiles.
-    Returns: The trials, and the names of the settings that there was no time for.
+    whole: budget of the study, including compiling; once it is spent, only methods that the user named are compiled.
+    named: True if the user named the methods; then each is started, however long its kernel compiles.
+    Returns: The trials, and the names of the settings that were left out for lack of time.
     """
     solvers = SOLVERS if solvers is None else solvers
     every = series_of(sample, methods, solvers, COMPENSATED if compensated is None else compensated)
@@ -133,7 +133,7 @@ def trials_of(
 def series_of(
     sample: Sample, methods: Sequence[str], solvers: Sequence[tuple[str, int | None]], compensated: Sequence[str]
 ) -> list[StepSeries]:
-    """The series of settings, the default precision of every method first."""
+    """Series of steps for all settings; the default precision of every method comes first."""
     plain: tuple[str, int | None] = ("quartic", None)
     settings = [(name, dtype, plain) for dtype in PRECISIONS for name in methods]
     settings += [(SOLVED_BY, "float64", solved) for solved in solvers if SOLVED_BY in methods]
@@ -145,7 +145,7 @@ def series_of(
 def halved(
     sample: Sample, series: StepSeries, trials: list[Trial], reference: Reference | None, until: int, budget: Budget
 ) -> bool:
-    """Run the next step of a series, and tell whether another is worth it."""
+    """Run the next step of a series; True if another step is worth its cost."""
     trial = tried(sample, series.candidate(sample), reference, until, budget)
     trials.append(trial)
     series.rungs += 1
@@ -164,7 +164,7 @@ def halved(
 
 
 def is_dominated(trial: Trial, trials: Sequence[Trial]) -> bool:
-    """True if another setting was more accurate in a tenth of the time."""
+    """True if another setting was more accurate at a tenth of the cost."""
     error = max(trial.error(of) for of in DECIDING)
     rivals = (rival for rival in trials if HOPELESS * rival.cpu_seconds < trial.cpu_seconds)
     return math.isfinite(error) and any(max(rival.error(of) for of in DECIDING) < error for rival in rivals)

@@ -38,7 +38,7 @@ class Sampled(Protocol):
 
     @property
     def energy(self) -> np.ndarray:
-        """Total energy, (k, n) [J], as `energy` gives it."""
+        """Total energy, (k, n) [J], as computed by `energy`."""
 
     @property
     def status(self) -> np.ndarray:
@@ -81,7 +81,7 @@ def _relative(result: Sampled) -> np.ndarray:
 
 
 def _momenta(result: Sampled) -> np.ndarray:
-    """(p, pi) about the user's origin, (k, n, 6), of the vehicle and of what moves in it."""
+    """(p, pi) about the user's origin, (k, n, 6), of the vehicle and of the masses that move in it."""
     relative = _relative(result)
     momenta = _momenta_of_vehicle(result, relative)
     return np.asarray(sum((inner.momenta for inner in _inner(result, relative)), momenta))
@@ -111,7 +111,7 @@ def kinetic_energy(result: Sampled) -> np.ndarray:
 
 
 def energy(result: Sampled) -> np.ndarray:
-    """Total energy (k, n) [J]: the kinetic one relative to the water, and the potential of every term."""
+    """Total energy (k, n) [J]: kinetic energy relative to the water, plus the potential of every term."""
     total = kinetic_energy(result)
     position, attitude = result.position.astype(np.float64), result.attitude.astype(np.float64)
     for term in (*terms.IMPLIED, *result.terms):
@@ -120,7 +120,7 @@ def energy(result: Sampled) -> np.ndarray:
 
 
 def linear_momentum(result: Sampled) -> np.ndarray:
-    """Linear momentum R p in inertial axes, (k, n, 3) [N s]. Without a potential it is conserved."""
+    """Linear momentum R p in inertial axes, (k, n, 3) [N s]; conserved without a potential."""
     return _times(result.attitude.astype(np.float64), _momenta(result)[..., :3])
 
 
@@ -133,10 +133,10 @@ def angular_momentum(result: Sampled) -> np.ndarray:
 
 
 def energy_growth(result: Sampled, *, dissipative: bool = False) -> np.ndarray:
-    """Largest change of energy of each member (n,), relative to the energy that it could hold; inf where one is not finite.
+    """Largest change of energy of each member (n,), relative to an energy scale; inf if some energy is not finite.
 
-    The latter is |p|^2 / (2 M_min) + |pi|^2 / (2 J_min) at the start and, up to each time, the largest change of the
-    potential. A bounded motion stays below about 1, however it exchanges energy.
+    The scale is |p|^2 / (2 M_min) + |pi|^2 / (2 J_min) at the start, plus the largest change of the potential up to each
+    time. For a bounded motion the result stays below about 1, for any exchange of energy.
     """
     kinetic, total = kinetic_energy(result), result.energy
     potential = total - kinetic
@@ -151,12 +151,12 @@ def energy_growth(result: Sampled, *, dissipative: bool = False) -> np.ndarray:
 
 
 def _present(result: Sampled) -> tuple[Term, ...]:
-    """The terms that some member of a result feels."""
+    """The terms that act on some member of a result."""
     return (*terms.IMPLIED, *(term for term in result.terms if term.present(result.own(term))))
 
 
 def conserved(result: Sampled) -> frozenset[str]:
-    """The names of `CONSERVED` that every acting law of a result's scene conserves, as each says itself (`Term.conserves`)."""
+    """The quantities of `CONSERVED` that every acting law of a result's scene conserves (`Term.conserves`)."""
     return CONSERVED.intersection(*(term.conserves for term in _present(result)))
 
 
@@ -166,16 +166,16 @@ def at_work(result: Sampled) -> tuple[str, ...]:
 
 
 def drift(result: Sampled) -> dict[str, float]:
-    """Largest change of energy and momenta, over the times that each member was under way.
+    """Largest change of energy and momenta while members were under way.
 
-    Where `conserved` names the quantity the change is an error of the method; elsewhere it contains the work of forces.
+    If `conserved` names a quantity, its change is an error of the method. Otherwise it includes the work of forces.
 
     Args:
         result: Samples with all four fields of the state.
 
     Returns:
-        "energy" [J], "horizontal_momentum" [N s] and "vertical_angular_momentum" [N m s]: the largest over times and members.
-        Members that failed are left out; NaN where all failed.
+        {name: largest change over times and members} of "energy" [J], "horizontal_momentum" [N s] and
+        "vertical_angular_momentum" [N m s]. Failed members are left out; NaN if all failed.
     """
     successful = ~failed(result.status)
     if not successful.any():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The fields of a vehicle's motion: shape, unit and meaning of each, by name."""
+"""The fields of a vehicle's motion, with the shape, unit and meaning of each."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy import ndindex
 
 @dataclass(frozen=True)
 class Field:
-    """Numbers of one vehicle at one time, of a shape: () for one number."""
+    """A field: numbers of one vehicle at one time, with a shape; () for one number."""
 
     name: str
     shape: tuple[int, ...]
@@ -19,12 +19,12 @@ class Field:
 
     @property
     def attributes(self) -> dict[str, str]:
-        """Attributes of a variable in xarray, Zarr and NetCDF; the unit as UDUNITS writes it, "m s-1"."""
+        """Attributes of a variable in xarray, Zarr and NetCDF; the unit is in UDUNITS form, such as "m s-1"."""
         return {"units": self.unit.replace("/s", " s-1"), "long_name": self.meaning}
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """Names of the entries: "position[2]", "attitude[0, 1]"; the field's name where it has one."""
+        """Names of the entries: "position[2]", "attitude[0, 1]"; the field's name if it has only one entry."""
         if not self.shape:
             return (self.name,)
         return tuple(f"{self.name}[{', '.join(map(str, index))}]" for index in ndindex(*self.shape))

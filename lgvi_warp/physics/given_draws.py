@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Standard normals that noise takes: streams of a term or a sensor, their places among all of a run, and those of a call."""
+"""Standard normal numbers for noise: streams of a term or a sensor, their columns in a run, and values given by a call."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from lgvi_warp.common.errors import refusal
 
 
 class Stream(NamedTuple):
-    """Standard normals of one kind that a term or a sensor draws, and which of a counter's they are.
+    """Standard normal numbers of one kind that a term or a sensor draws, and their source among the counters' numbers.
 
-    name: of what they drive. size: numbers of a draw. number: 0 or 1, the stream of the counters. place: of the first of a
-    counter's four normals. at_start: whether they are drawn once, by the host, for where members start.
+    name: Name of the noise that they drive. size: Count of numbers of a draw. number: 0 or 1, the stream of the counters.
+    place: Index of the first of a counter's four normal numbers. at_start: Whether the host draws them once, at the start.
     """
 
     name: str
@@ -31,16 +31,16 @@ class NoiseDraws:
     """Standard normal draws that one stream of a noisy term, or of a sensor, uses in a run.
 
     Attributes:
-        of: key of the term or of the sensor.
-        stream: what they drive: "force" or "torque" of white noise; "current", and "start" for where it starts; "noise",
-            "drift", "dropout", "outlier" or "outlier_std" of a sensor; "0" or "1", the number of the stream, of a law of your
-            own.
-        first: time of the first draw [s].
-        spacing: time from one draw to the next [s].
-        count: number of draws.
-        size: numbers of a draw, 3 for axes x, y, z, or 1.
-        column: first of their columns of xi: draw after draw, axis after axis.
-        source: which of the counters' normals they are.
+        of: Key of the term or of the sensor.
+        stream: Noise that the draws drive: "force" or "torque" of white noise; "current", and "start" for its first value;
+            "noise", "drift", "dropout", "outlier" or "outlier_std" of a sensor; for a law that you write, "0" or "1", the
+            number of the stream.
+        first: Time of the first draw [s].
+        spacing: Time from one draw to the next [s].
+        count: Number of draws.
+        size: Count of numbers of a draw, 3 for axes x, y, z, or 1.
+        column: First column of these draws in xi. Columns are ordered by draw, then by axis.
+        source: The stream of the counters that would otherwise give these numbers.
     """
 
     of: str
@@ -54,7 +54,7 @@ class NoiseDraws:
 
     @property
     def numbers(self) -> int:
-        """Count of normals."""
+        """Count of normal numbers."""
         return self.count * self.size
 
     @property
@@ -76,10 +76,10 @@ class DrawTimes(NamedTuple):
 
 
 class DrawLayout:
-    """The draws of a run, one after the other, and of each term or sensor those of the start last.
+    """The draws of a run in the order of their columns; for each term or sensor, draws of the start come last.
 
     Args:
-        streams: For each term or sensor its key, its streams and when it draws.
+        streams: For each term or sensor: its key, its streams and its times of draws.
     """
 
     def __init__(self, streams: Iterable[tuple[str, Sequence[Stream], DrawTimes]]):
@@ -105,13 +105,13 @@ class DrawLayout:
         """The draws of a term or a sensor by stream.
 
         Args:
-            key: Its key.
+            key: Key of the term or sensor.
 
         Returns:
-            Its draws, in the order of their columns.
+            {stream: draws}, in the order of their columns.
 
         Raises:
-            SceneError: If it has none: it draws for some member by numbers that were not said to vary.
+            SceneError: If it has no draws, since the numbers with which it acts on some member were not named as varied.
         """
         if key not in self._by_key:
             remedy = "name what varies of it: prepare(scene, vary=[...], draws='given')"
@@ -119,10 +119,10 @@ class DrawLayout:
         return self._by_key[key]
 
     def owner(self, column: int) -> str:
-        """Say whose a column of xi is.
+        """The owner of a column of xi.
 
         Args:
-            column: Its number.
+            column: Index of the column.
 
         Returns:
             The stream and its owner, as text.
@@ -133,47 +133,47 @@ class DrawLayout:
 
 @dataclass(frozen=True, eq=False)
 class GivenDraws:
-    """Standard normals of members in place of those that counters would give.
+    """Standard normal numbers of members, used instead of those drawn from counters.
 
     Args:
-        layout: What they are.
-        values: Normals (n, m), columns as the layout has them; (1, m) where members share them.
+        layout: The draws to which the columns belong.
+        values: Normal numbers (n, m), in the columns of the layout; (1, m) if members share them.
     """
 
     layout: DrawLayout
     values: np.ndarray
 
     def of_members(self, chosen: slice | np.ndarray) -> GivenDraws:
-        """Choose members.
+        """Select members.
 
         Args:
-            chosen: Their places.
+            chosen: Positions of the members.
 
         Returns:
-            The normals of these.
+            The normal numbers of these members.
         """
         return self if len(self.values) == 1 else replace(self, values=self.values[chosen])
 
     def of_stream(self, key: str, stream: str) -> np.ndarray:
-        """Return the normals of one stream.
+        """Return the normal numbers of one stream.
 
         Args:
             key: Key of the term or of the sensor.
             stream: Name of the stream.
 
         Returns:
-            Normals (1 or n, numbers).
+            Normal numbers (1 or n, numbers).
         """
         return self.values[:, self.layout.of(key)[stream].columns]
 
     def rows(self, key: str) -> np.ndarray | None:
-        """Return what the device code of a term or a sensor reads.
+        """Return the normal numbers that the device code of a term or a sensor reads.
 
         Args:
-            key: Its key.
+            key: Key of the term or sensor.
 
         Returns:
-            Normals (1 or n, rows); None where it draws nothing.
+            Normal numbers (1 or n, rows); None if it draws nothing.
         """
         entries = [entry for entry in self.layout if entry.of == key and not entry.source.at_start]
         if not entries:
@@ -184,10 +184,10 @@ class GivenDraws:
         """Find the streams that the device code of a term or a sensor reads.
 
         Args:
-            key: Its key.
+            key: Key of the term or sensor.
 
         Returns:
-            The first row of each among those of `rows`, by name.
+            {stream: its first row among those of `rows`}.
         """
         entries = [entry for entry in self.layout.of(key).values() if not entry.source.at_start]
         return {entry.stream: entry.column - entries[0].column for entry in entries}

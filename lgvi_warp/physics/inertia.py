@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The inertia of a vehicle about the origins and in the axes that a method needs.
+"""The inertia of a vehicle about the origins and in the axes that a method requires.
 
 I6 = [[M, C], [C^T, J]], linear part first. E = M^-1 C, Js = J - C^T M^-1 C. Arrays have a leading dimension of 1 (shared by
 all members) or n. A shift of the origin by d (body axes) leaves M and Js unchanged and adds hat(d) to E.
@@ -23,7 +23,7 @@ DIAGONAL = 1e-12
 
 
 def vee(A: np.ndarray) -> np.ndarray:
-    """Vectors (..., 3) of the skew part of matrices (..., 3, 3), the inverse of `hat`."""
+    """Vectors (..., 3) of the skew-symmetric part of matrices (..., 3, 3); the inverse of `hat`."""
     return 0.5 * np.stack([A[..., i, j] - A[..., j, i] for i, j in ((2, 1), (0, 2), (1, 0))], axis=-1)
 
 
@@ -41,16 +41,16 @@ def blocks(I6: np.ndarray) -> Blocks:
 
 
 def joined(M: np.ndarray, C: np.ndarray, J: np.ndarray) -> np.ndarray:
-    """Mass matrices (n, 6, 6), linear part first, made of their blocks M [kg], C [kg m] and J [kg m2], (n, 3, 3) each."""
+    """Mass matrices (n, 6, 6), linear part first, from their blocks M [kg], C [kg m] and J [kg m2], (n, 3, 3) each."""
     I6 = np.empty((max(len(M), len(C), len(J)), 6, 6))
     I6[:, :3, :3], I6[:, :3, 3:], I6[:, 3:, :3], I6[:, 3:, 3:] = M, C, np.swapaxes(C, -1, -2), J
     return I6
 
 
 def motion_from(origin: np.ndarray, Q: np.ndarray) -> np.ndarray:
-    """Matrices X (n, 6, 6) that turn (nu, Om) at another origin and in axes Q into those of the same motion at the user's.
+    """Matrices X (n, 6, 6) that convert (nu, Om) at another origin and in axes Q to the user's origin and axes.
 
-    origin: (n, 3) [m], from the user's in his axes. Q: (n, 3, 3), the other axes in the user's.
+    origin: (n, 3) [m], relative to the user's origin, in the user's axes. Q: (n, 3, 3), the other axes in the user's axes.
     """
     X = np.zeros((max(len(Q), len(origin)), 6, 6))
     X[:, :3, :3] = X[:, 3:, 3:] = Q + 0.0  # without negative zeros
@@ -61,7 +61,7 @@ def motion_from(origin: np.ndarray, Q: np.ndarray) -> np.ndarray:
 def moved(I6: np.ndarray, origin: np.ndarray, Q: np.ndarray) -> np.ndarray:
     """Mass matrices (n, 6, 6) about another origin and in other axes.
 
-    I6: (n, 6, 6) about the user's origin, in his axes. origin: (n, 3) [m]. Q: (n, 3, 3), as in `motion_from`.
+    I6: (n, 6, 6) about the user's origin, in the user's axes. origin: (n, 3) [m]. Q: (n, 3, 3). Both as in `motion_from`.
     """
     X = motion_from(origin, Q)
     return np.swapaxes(X, -1, -2) @ I6 @ X
@@ -72,7 +72,7 @@ def coupling(I6: np.ndarray) -> np.ndarray:
 
     docs/theory/coupled.md, (X6).
 
-    It is infinite where round-off or overflow leaves no positive definite matrix.
+    It is infinite if round-off or overflow makes the matrix not positive definite.
     """
     M, C, J = blocks(I6)
     try:
@@ -87,13 +87,13 @@ def coupling(I6: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Frame:
-    """The axes and origins in which a kernel keeps a vehicle. Leading dimensions are 1 or n.
+    """The axes and origins of a vehicle in the kernel. Leading dimensions are 1 or n.
 
-    origin, forces: Origins of the state and of the forces, (., 3) [m], from the user's in his axes.
+    origin, forces: Origins of the state and of the forces, (., 3) [m], relative to the user's origin, in the user's axes.
     M, J: Mass matrix (., 3, 3) [kg] and diagonal (Schur) inertia (., 3) [kg m2] in the axes Q.
     E, E_forces: M^-1 C at the origin of the state and at that of the forces, (., 3, 3) [m]; 0 without coupling.
-    whole: the 6x6 inertia (n, 6, 6) in the user's axes, where M and J are no diagonals there or couple; then J are principal
-        moments about `center`, the origin where coupling is least, (n, 3) [m].
+    whole: The 6x6 inertia (n, 6, 6) in the user's axes, if M and J are not diagonal there or are coupled. J then holds the
+        principal moments about `center`, the origin with the least coupling, (n, 3) [m].
     """
 
     Q: np.ndarray
@@ -108,12 +108,12 @@ class Frame:
 
     @functools.cached_property
     def turned(self) -> bool:
-        """Whether some member's axes are not the user's."""
+        """Whether some member's axes differ from the user's axes."""
         return bool((notation.EYE != self.Q).any())
 
     @functools.cached_property
     def shifted(self) -> bool:
-        """Whether some member's origin of the state is not the user's."""
+        """Whether some member's origin of the state differs from the user's origin."""
         return bool(self.origin.any())
 
     def with_mass(self, M: np.ndarray) -> Frame:
@@ -124,7 +124,7 @@ class Frame:
 
     @functools.cached_property
     def mass_diagonal(self) -> np.ndarray | None:
-        """Diagonals (., 3) of the mass matrices, where none has another entry; else None."""
+        """Diagonals (., 3) of the mass matrices if all are diagonal; else None."""
         return notation.only_diagonal(self.M)
 
     @property
@@ -136,22 +136,22 @@ class Frame:
 
     @functools.cached_property
     def from_forces(self) -> np.ndarray:
-        """Matrices (., 6, 6) that give the user's velocities from those at the origin of the forces, in these axes."""
+        """Matrices (., 6, 6) from velocities at the origin of the forces, in these axes, to the user's velocities."""
         return motion_from(self.forces, self.Q)
 
     @property
     def balance(self) -> np.ndarray:
-        """The origin about which weight and buoyancy swing the vehicle, (., 3) [m]: that of least coupling."""
+        """The origin about which weight and buoyancy swing the vehicle, (., 3) [m]: the one with the least coupling."""
         return self.forces if self.center is None else self.center
 
     @functools.cached_property
     def inverse(self) -> np.ndarray:
-        """The inverse (n, 6, 6) of the whole inertia."""
+        """The inverse (n, 6, 6) of the 6x6 inertia."""
         return np.asarray(np.linalg.inv(self.inertia_at(self.E) if self.whole is None else self.whole))
 
     @property
     def aligned(self) -> bool:
-        """Whether every member's axes are the user's up to order and sense, and the origin of the forces is the user's."""
+        """Whether all members have the user's axes, up to order and sign, and the user's origin for the forces."""
         Q = np.abs(self.Q)
         return bool(np.all((Q == 0.0) | (Q == 1.0)) and not np.any(self.forces))
 
@@ -161,7 +161,7 @@ class Frame:
         return bool(np.any(self.E) or np.any(self.E_forces))
 
     def inertia_at(self, E: np.ndarray) -> np.ndarray:
-        """Mass matrix (n, 6, 6) in these axes, where M^-1 C is E (n, 3, 3) [m]: J = Js + E^T M E."""
+        """Mass matrix (n, 6, 6) in these axes at the origin with M^-1 C = E (n, 3, 3) [m]; there J = Js + E^T M E."""
         if self.whole is not None:
             return self.whole
         J = self.J[:, :, None] * notation.EYE
@@ -172,11 +172,11 @@ class Frame:
         return np.einsum("nji,n...j->n...i", *notation.repeated(self.Q, v))
 
     def point(self, r: np.ndarray) -> np.ndarray:
-        """Points (n, ..., 3) [m] from the user's origin in his axes, from the origin of the forces in these."""
+        """Convert points (n, ..., 3) [m] in the user's frame to these axes, relative to the origin of the forces."""
         return self.vector(r - _expanded(self.forces, r))
 
     def torque(self, torque: np.ndarray, force: np.ndarray) -> np.ndarray:
-        """Torques (n, ..., 3) [N m] about the user's origin, of wrenches with these forces, about the origin of the forces.
+        """Convert torques (n, ..., 3) [N m] of wrenches with these forces from the user's origin to that of the forces.
 
         The angular part of a twist that measures a velocity transforms in the same way.
         """
@@ -210,9 +210,9 @@ def in_axes(Q: np.ndarray, A: np.ndarray) -> np.ndarray:
 
 
 def uncoupled_frame(body: Blocks) -> tuple[Frame, np.ndarray]:
-    """The frame with J diagonal at the origin where M and J are uncoupled, and the coupling norm (n,) that remains there.
+    """The frame with diagonal J at the origin of least coupling, and the coupling norm (n,) that remains there.
 
-    The coupling vanishes there if and only if E is skew.
+    The coupling vanishes there if and only if E is skew-symmetric.
     """
     M, E, Js = schur(body)
     origin = -vee(E)
@@ -239,7 +239,7 @@ def user_frame(body: Blocks) -> Frame:
 
 
 def user_frame_with_mass(frame: Frame, M: np.ndarray, J: np.ndarray) -> Frame:
-    """The frame of the user's axes for another mass matrix (n, 3, 3) [kg]. J: the inertia (n, 3, 3) that the frame is of."""
+    """The frame of the user's axes for another mass matrix (n, 3, 3) [kg]. J: The inertia (n, 3, 3) of the frame."""
     if frame.whole is None and not notation.off_diagonal(M).any():
         return replace(frame, M=M)
     n = max(len(M), len(J))
@@ -247,7 +247,7 @@ def user_frame_with_mass(frame: Frame, M: np.ndarray, J: np.ndarray) -> Frame:
 
 
 def ascending(Q: np.ndarray, J: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Principal axes (n, 3, 3) and inertias (n, 3) [kg m2] in the order of rising inertia, still right-handed."""
+    """Right-handed principal axes (n, 3, 3) and inertias (n, 3) [kg m2] in the order of rising inertia."""
     order = np.argsort(J, axis=1, kind="stable")
     Q = np.take_along_axis(Q, order[:, None, :], axis=2)
     Q = Q * np.where(np.arange(3) == 2, np.sign(np.linalg.det(Q))[:, None], 1.0)[:, None, :]
@@ -255,9 +255,9 @@ def ascending(Q: np.ndarray, J: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def nearest_axes(Q: np.ndarray, like: np.ndarray, ordered: bool) -> np.ndarray:
-    """Matrices P (n, 3, 3) that put axes Q into another order and sense, so that Q P is next to other axes (n, 3, 3).
+    """Matrices P (n, 3, 3) that change order and signs of axes Q, so that Q P is nearest to the axes `like` (n, 3, 3).
 
-    The identity where none is next to them. ordered: whether their order stays.
+    P is the identity if there is no such matrix. ordered: Whether the order of the axes must stay.
     """
     between = np.swapaxes(Q, -1, -2) @ like
     largest = np.abs(between).argmax(axis=1)
@@ -270,16 +270,16 @@ def nearest_axes(Q: np.ndarray, like: np.ndarray, ordered: bool) -> np.ndarray:
 
 
 def in_order(frame: Frame, P: np.ndarray) -> Frame:
-    """The same frame with its axes in another order and sense; P: as in `nearest_axes`."""
+    """The same frame with its axes in another order and with other signs; P: As in `nearest_axes`."""
     order = np.abs(P).argmax(axis=1)
     M, E, E_forces = (in_axes(P, each) if each.any() else each for each in (frame.M, frame.E, frame.E_forces))
     return replace(frame, Q=frame.Q @ P, J=np.take_along_axis(frame.J, order, axis=1), M=M, E=E, E_forces=E_forces)
 
 
 def turns_frame(body: Blocks, middle: int = 3) -> tuple[Frame, np.ndarray]:
-    """The frame of psi_x: the state at axis 1's origin, the forces at the origin of axis `middle`.
+    """The frame of psi_x, with the state at the origin of axis 1 and the forces at the origin of axis `middle`.
 
-    Returns: The frame, and U (n, 3, 3) [m], upper triangular: E at the origin of the state.
+    Returns: The frame, and the upper triangular U (n, 3, 3) [m], which is E at the origin of the state.
     """
     M, E, Js = schur(body)
     Q, J = ascending(*notation.principal_axes(Js))
@@ -296,7 +296,7 @@ def turns_frame(body: Blocks, middle: int = 3) -> tuple[Frame, np.ndarray]:
 
 
 def symmetric_frame(body: Blocks) -> Frame:
-    """The frame of psi_w: at the origin where E = S is symmetric, in the principal axes of Js."""
+    """The frame of psi_w, at the origin with a symmetric E = S, in the principal axes of Js."""
     M, E, Js = schur(body)
     origin = -vee(E)
     Q, J = notation.principal_axes(Js)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Conversion between the user's notation and axes (Fossen's) and the paper's: momenta, principal axes, attitudes.
+"""Conversions between the user's notation (Fossen's) and the paper's: momenta, principal axes, attitudes.
 
 velocity = nu, angular_velocity = Om, position = b, attitude = R (body to inertial); p = M nu, pi = J Om.
-Every function accepts any leading dimensions; matrices and vectors of a leading dimension 1 are shared.
+Every function accepts any leading dimensions; a leading dimension of 1 is broadcast.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ ORTHOGONAL = 1e-9
 
 
 def repeated(*arrays: np.ndarray) -> list[np.ndarray]:
-    """Repeat shared rows, so that all arrays have the same number of rows.
+    """Repeat single rows, so that all arrays have the same number of rows.
 
     Args:
         arrays: Arrays (1 or n, ...).
@@ -36,7 +36,7 @@ def repeated(*arrays: np.ndarray) -> list[np.ndarray]:
 
 
 def hat(a: np.ndarray) -> np.ndarray:
-    """Skew matrices of vectors, with hat(a) x = a x x.
+    """Skew-symmetric matrices of vectors, for which hat(a) times a vector v is the cross product of a and v.
 
     Args:
         a: Vectors (..., 3).
@@ -51,7 +51,7 @@ def hat(a: np.ndarray) -> np.ndarray:
 
 
 def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Cross products as of np.cross, in a third of its time for few vectors.
+    """Cross products, as by np.cross, but in a third of its time for few vectors.
 
     Args:
         a: Vectors (..., 3).
@@ -113,14 +113,14 @@ def off_diagonal(matrices: np.ndarray) -> np.ndarray:
 
 
 def reduced(operation: np.ufunc, values: np.ndarray) -> np.ndarray:
-    """Result of an operation over the numbers of all members, such as the largest.
+    """Reduce the numbers of all members by an operation, for example to the largest.
 
     Args:
         operation: np.maximum, np.minimum, np.logical_or or np.bitwise_or, for which the order of members does not matter.
         values: Numbers (n, ...).
 
     Returns:
-        Numbers (...). Many members are taken in long rows, in a third of the time.
+        Numbers (...). Many members are processed in long rows, in a third of the time.
     """
     rows, shape = values.reshape(len(values), -1), values.shape[1:]
     if len(rows) % FOLD == 0 and len(rows) > FOLD and rows.flags.c_contiguous:
@@ -135,7 +135,7 @@ def only_diagonal(matrices: np.ndarray) -> np.ndarray | None:
         matrices: Matrices (n, 3, 3).
 
     Returns:
-        Diagonals (n, 3); None where some matrix has another entry.
+        Diagonals (n, 3); None if some matrix is not diagonal.
     """
     entries: np.ndarray = matrices
     if len(matrices) > FOLD:
@@ -147,14 +147,14 @@ def only_diagonal(matrices: np.ndarray) -> np.ndarray | None:
 
 
 def rotations(R: np.ndarray, limit: float = ORTHOGONAL) -> np.ndarray:
-    """Mask of matrices that are rotations to within a limit.
+    """Mask of matrices that are rotations within a tolerance.
 
     Args:
         R: Matrices (..., 3, 3).
-        limit: Most that an entry of R^T R - I may have, by default 1e-9.
+        limit: Largest size of an entry of R^T R - I, by default 1e-9.
 
     Returns:
-        Mask (...), False where a number is not finite.
+        Mask (...), False for matrices that are not finite.
     """
     with np.errstate(invalid="ignore", over="ignore"):
         close = np.abs(np.swapaxes(R, -1, -2) @ R - np.eye(3)).max(axis=(-1, -2)) <= limit
@@ -222,13 +222,13 @@ def matrix_from_quaternion(q: np.ndarray) -> np.ndarray:
 
 
 def quaternion_from_matrix(R: np.ndarray) -> np.ndarray:
-    """Unit quaternion of a rotation matrix (Shepperd 1978: divide by the largest of the four).
+    """Unit quaternion of a rotation matrix (Shepperd 1978, which divides by the largest of the four components).
 
     Args:
         R: Rotation matrices (..., 3, 3).
 
     Returns:
-        Quaternions (..., 4), scalar first and not negative.
+        Quaternions (..., 4), scalar first; the scalar is not negative.
     """
     R = np.asarray(R, dtype=np.float64)
     xx, yy, zz = R[..., 0, 0], R[..., 1, 1], R[..., 2, 2]
@@ -246,7 +246,7 @@ def quaternion_from_matrix(R: np.ndarray) -> np.ndarray:
 
 
 def matrix_from_euler_deg(angles: np.ndarray) -> np.ndarray:
-    """Rotation matrix Rz(yaw) Ry(pitch) Rx(roll), Fossen's zyx convention.
+    """Rotation matrix Rz(yaw) Ry(pitch) Rx(roll), in Fossen's zyx convention.
 
     Args:
         angles: Roll, pitch and yaw, (..., 3) [deg].

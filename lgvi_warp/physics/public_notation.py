@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Functions of `lw.notation` as users call them: the same as in notation.py, with arguments that are read and checked."""
+"""The functions of `lw.notation`: those of notation.py, with conversion and checks of the arguments."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ VECTOR, MATRIX, QUATERNION = (3,), (3, 3), (4,)
 
 
 def _checked(function: Function, rows: bool = False, **shapes: tuple[int, ...]) -> Function:
-    """A function that reads arrays of which it knows the last dimensions; rows: whether there is one dimension before."""
+    """Wrap a function with checks of its arrays' last dimensions; rows: Whether there is one dimension before these."""
     signature = inspect.signature(function)
 
     @functools.wraps(function)
@@ -50,7 +50,7 @@ def _checked(function: Function, rows: bool = False, **shapes: tuple[int, ...]) 
 
 
 def _array(faults: Faults, name: str, value: Any) -> np.ndarray:
-    """An array of real numbers; one of floats as it is."""
+    """An array of real numbers; an array of floats is returned unchanged."""
     if type(value) is np.ndarray and value.dtype.kind == "f":
         return value
     read = faults.real(name, value)
@@ -59,7 +59,7 @@ def _array(faults: Faults, name: str, value: Any) -> np.ndarray:
 
 @functools.wraps(notation.repeated)
 def repeated(*arrays: np.ndarray) -> list[np.ndarray]:
-    """Repeat what all members share, of arrays that are checked."""
+    """Check arrays, and repeat single rows, so that all arrays have the same number of rows."""
     faults = Faults()
     read = [_array(faults, f"arrays[{i}]", value) for i, value in enumerate(arrays)]
     most = max((len(array) for array in read if array.ndim), default=0)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Rates of a member at its start: those that limit the step of a method.
+"""Rates of a member's motion at its start, which limit the step of a method.
 
-The rates are |J^-1 pi| of its rotation, w of its Munk oscillation and of its restoring oscillation, and (l + 2 q |v|) / I of
-its drag.
+The rates are |J^-1 pi| of the rotation, the frequencies w of the Munk oscillation and of the restoring oscillation, and
+(l + 2 q |v|) / I of the drag.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from lgvi_warp.physics import inertia, vehicle
 def rates(
     parameters: Mapping[str, np.ndarray], velocity: np.ndarray, angular_velocity: np.ndarray
 ) -> dict[str, np.ndarray]:
-    """Rates of members at their start, by the names of LIMITS, (n,) [rad/s; drag 1/s] (Mathematics, section 7).
+    """Rates of members at their start, {name in LIMITS: (n,) [rad/s; drag 1/s]} (Mathematics, section 7).
 
     w_Munk^2 = |p|^2 (1/M_min - 1/M_max) / J_min, w_restoring^2 = B |r| / J_min. Velocities (n, 3) are in body axes.
     """
@@ -42,7 +42,7 @@ def rates(
 def drag_rate(
     parameters: Mapping[str, np.ndarray], I6: np.ndarray, velocity: np.ndarray, angular_velocity: np.ndarray
 ) -> np.ndarray:
-    """The largest (l_ii + 2 q_ii |v_i|) / I_ii over the six axes, summed over all drag terms, (n,) [1/s]; 0 without drag."""
+    """The largest (l_ii + 2 q_ii |v_i|) / I_ii of the six axes (n,) [1/s], with the sums l and q of all drag terms."""
     speeds = np.abs(np.concatenate([velocity, angular_velocity], axis=1))
     total = np.zeros_like(speeds)
     for key in drag_keys(parameters):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The vehicle's outer shape: how it is drawn. No force depends on it."""
+"""The vehicle's drawn shape. No force depends on it."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ REMEDY = 'give length and diameter [m], or mesh = "hull.glb"'
 
 @dataclass(frozen=True)
 class Shape:
-    """Drawn shape of a vehicle: a hull of revolution along the body's x axis, or a mesh. It is no part of the dynamics.
+    """Drawn shape of a vehicle: a hull of revolution along the body's x axis, or a mesh. It has no effect on the motion.
 
     Args:
         length: Length of the hull [m].
         diameter: Largest diameter of the hull [m].
-        mesh: In place of these, path of a binary glTF file (.glb) in body axes (x ahead, y to starboard, z down) [m]. In a
-            scene file it is relative to the file's folder, and must lie within it.
+        mesh: Instead of a hull, path of a binary glTF file (.glb) in body axes (x ahead, y to starboard, z down) [m]. In a
+            scene file the path is relative to the file's folder, and must lie within it.
 
     Raises:
-        SceneError: If neither or both are given, or a number is not positive. The message lists every fault.
+        SceneError: If neither or both of hull and mesh are given, or a number is not positive. The message lists every fault.
     """
 
     length: float | None = positive(None, unit="m")
@@ -46,7 +46,7 @@ class Shape:
         faults.raise_if_any()
 
     def to_dict(self) -> dict[str, Any]:
-        """Given fields, as the table [vehicle.shape] of a scene file."""
+        """The given fields, as the table [vehicle.shape] of a scene file."""
         return {key: value for key, value in vars(self).items() if value is not None}
 
 

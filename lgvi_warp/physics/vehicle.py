@@ -33,7 +33,7 @@ SYMMETRIC = ("added_mass", "inertia", "rigid_body_mass_matrix", "added_mass_matr
 
 
 class RepeatedWarning(str):
-    """A warning that a vehicle raises about its own numbers, and raises again when it is rebuilt from another's fields."""
+    """A warning about a vehicle's own numbers; a vehicle rebuilt from the fields of another one finds it again."""
 
 
 def _are_texts(value: Any) -> bool:
@@ -47,29 +47,29 @@ class Vehicle(Summarized):
     """A rigid body in water, in body axes (x ahead, y to starboard, z down), described in one of two forms.
 
     The simple form is about the centre of gravity: `mass`, `inertia`, `added_mass`. The 6x6 form is about any origin of the
-    body: `rigid_body_mass_matrix`, `added_mass_matrix`, `weight`, `center_of_gravity`. Matrices are stored in full. All
-    arguments but `mass` are keyword-only, since inertia and added mass look alike.
+    body: `rigid_body_mass_matrix`, `added_mass_matrix`, `weight`, `center_of_gravity`. A diagonal (3,) is stored as a full
+    matrix. All arguments but `mass` are keyword-only, so that inertia and added mass are not confused.
 
     Args:
         mass: Dry mass [kg]. Simple form.
-        inertia: Inertia about the centre of gravity, added inertia included, (3,) or (3, 3) [kg m2]. Simple form.
+        inertia: Inertia about the centre of gravity, including added inertia, (3,) or (3, 3) [kg m2]. Simple form.
         added_mass: Added mass of translation, (3,) or symmetric (3, 3) [kg]; 0 by default. Simple form.
         buoyancy: Weight of the displaced water [N]; 0 by default.
-        center_of_buoyancy: Where buoyancy acts, (3,) [m] from the origin; by default the origin.
+        center_of_buoyancy: Point at which buoyancy acts, (3,) [m] from the origin; by default the origin.
         rigid_body_mass_matrix: Mass matrix of the dry body, (6, 6) [kg, kg m, kg m2], linear part first. 6x6 form.
         added_mass_matrix: Added mass, (6, 6) [kg, kg m, kg m2], positive: minus Fossen's X_udot and so on; 0 by default.
             6x6 form.
         weight: Weight [N]; by default mass times gravity. 6x6 form.
-        center_of_gravity: Where the weight acts, (3,) [m] from the origin; by default where the rigid body's matrix has it.
-            6x6 form.
+        center_of_gravity: Point at which the weight acts, (3,) [m] from the origin; by default that of the rigid body's mass
+            matrix. 6x6 form.
         inertia_tolerance: Allowed violation of the triangle inequality of the principal inertias, as a fraction of the
-            largest one, in the 6x6 form. With 0, the default, a matrix that no rigid body has is refused; importers set it
-            for published numbers.
-        warnings: Texts about what is unusual but allowed, as importers give them. The vehicle adds what it finds itself;
-            all are among the messages of a run.
-        shape: How the vehicle is drawn, a table with `length` and `diameter` [m] or with `mesh`, the path of a .glb file; by
-            default a hull of the displaced volume. No part of the dynamics.
-        title: What the vehicle is called in summaries and reports; by default the name of a vehicle of the package.
+            largest one, in the 6x6 form. With 0, the default, a matrix that no rigid body can have is refused; importers set
+            it for published numbers.
+        warnings: Texts about unusual but allowed numbers, such as those of importers. The vehicle adds its own warnings; a
+            run shows all of them in its messages.
+        shape: Drawn shape of the vehicle, a table with `length` and `diameter` [m] or with `mesh`, the path of a .glb file; by
+            default a hull of the displaced volume. It has no effect on the motion.
+        title: Name of the vehicle in summaries and reports; by default the name of a vehicle of the package.
 
     Raises:
         SceneError: If a number is not finite, not positive, of the wrong shape, not symmetric or not positive definite.
@@ -126,7 +126,7 @@ class Vehicle(Summarized):
 
     @property
     def full(self) -> bool:
-        """Whether the inertia is given by 6x6 matrices."""
+        """Whether the vehicle is given in the 6x6 form."""
         return self.rigid_body_mass_matrix is not None or self.added_mass_matrix is not None
 
     def _simple(self, faults: Faults) -> dict[str, Any]:
@@ -171,7 +171,7 @@ class Vehicle(Summarized):
         return values | {"center_of_gravity": center, "warnings": warnings}
 
     def _triangle(self, faults: Faults, rigid: np.ndarray) -> tuple[str, ...]:
-        """Add a fault for principal inertias that no rigid body has; return warnings for those within the tolerance."""
+        """Add a fault for principal inertias that no rigid body can have; return warnings for those within the tolerance."""
         short = float(shortage(rigid[None])[0])
         if short <= ROUND_OFF:
             return ()
@@ -218,8 +218,8 @@ class Vehicle(Summarized):
         """The numbers that may vary by member.
 
         Returns:
-            Each number by its name, as a float64 array in its own shape. The weight of a 6x6 vehicle is among them only if it
-            was given.
+            {name: number}, as float64 arrays, each in its own shape. The weight of a vehicle in the 6x6 form is included only
+            if it was given.
         """
         names = [name for name in (FULL if self.full else SIMPLE) if getattr(self, name) is not None]
         return {name: np.asarray(getattr(self, name), dtype=np.float64) for name in names}
@@ -228,8 +228,8 @@ class Vehicle(Summarized):
         """The vehicle as a table of a scene file.
 
         Returns:
-            Numbers by name; 3x3 matrices that are diagonal as their diagonal. Of the warnings, only those of the user. The
-            shape and the title, where there are any.
+            Numbers by name, with diagonal 3x3 matrices given by their diagonal; the user's warnings, without those of the
+            vehicle; and the shape and the title, if given.
         """
         content = {}
         for name, value in self.parameters().items():
@@ -248,20 +248,20 @@ SIGN = "added mass is positive here: minus Fossen's X_udot, Y_vdot, Z_wdot ..."
 
 
 def _definite(matrix: np.ndarray, added: Any = 0.0) -> bool:
-    """Whether the sum of two matrices is positive definite; False where it overflows."""
+    """Whether the sum of two matrices is positive definite; False if it overflows."""
     with np.errstate(over="ignore"):
         total = matrix + added
     return bool(np.isfinite(total).all() and np.linalg.eigvalsh(total)[0] >= LEAST)
 
 
 def compact(matrix: np.ndarray) -> list[Any]:
-    """A 3x3 matrix as a scene file writes it."""
+    """A 3x3 matrix in the form of a scene file."""
     diagonal = np.diag(matrix)
     return (diagonal if np.array_equal(matrix, np.diag(diagonal)) else matrix).tolist()
 
 
 def unusual(name: str, inertia: Any) -> tuple[str, ...]:
-    """Warn about principal inertias [kg m2] that no rigid body has (J_i + J_j < J_k), though added inertia may bring them."""
+    """Warnings for principal inertias [kg m2] that no dry rigid body has (J_i + J_j < J_k); added inertia may explain them."""
     small, middle, large = np.linalg.eigvalsh(inertia)
     if small >= large * (1.0 - 1e-12) - middle:
         return ()
@@ -270,25 +270,25 @@ def unusual(name: str, inertia: Any) -> tuple[str, ...]:
 
 
 def about_center(rigid: np.ndarray) -> np.ndarray:
-    """Inertia (n, 3, 3) [kg m2] about the centre of gravity, of rigid bodies' mass matrices (n, 6, 6) about any origin."""
+    """Inertia (n, 3, 3) [kg m2] about the centre of gravity, from rigid-body mass matrices (n, 6, 6) about any origin."""
     m = rigid[:, :1, :1]
     H = notation.hat(-inertias.vee(rigid[:, :3, 3:]) / m[:, 0])
     return np.asarray(rigid[:, 3:, 3:] + m * (H @ H))
 
 
 def shortage(rigid: np.ndarray) -> np.ndarray:
-    """The part (n,) of the largest principal inertia by which the others sum to less than it; above 0 no rigid body has it."""
+    """1 - (J_1 + J_2) / J_3 (n,) of the rising principal inertias; a rigid body cannot have a value above 0."""
     small, middle, large = np.linalg.eigvalsh(about_center(rigid)).T
     return np.asarray(1.0 - (small + middle) / large)
 
 
 def impossible(rigid: np.ndarray, tolerance: float = 0.0) -> np.ndarray:
-    """Mask (n,) of the mass matrices (n, 6, 6) that no rigid body has: two principal inertias sum to less than the third."""
+    """Mask (n,) of mass matrices (n, 6, 6) that no rigid body has: two principal inertias sum to less than the third."""
     return shortage(rigid) > max(tolerance, ROUND_OFF)
 
 
 def inertia_blocks(p: Numbers) -> inertias.Blocks:
-    """Blocks of the mass matrix of body and added mass about the user's origin, each with a member for what varies in it."""
+    """Blocks of the mass matrix of body and added mass about the user's origin, each of 1 or n members."""
     if "vehicle.rigid_body_mass_matrix" in p:
         return inertias.blocks(p["vehicle.rigid_body_mass_matrix"] + p["vehicle.added_mass_matrix"])
     return inertias.Blocks(mass_matrix(p), np.zeros((1, 3, 3)), p["vehicle.inertia"])
@@ -330,14 +330,14 @@ def weight(p: Numbers) -> np.ndarray:
 
 
 def displaced_mass(p: Numbers) -> np.ndarray:
-    """Mass (n,) [kg] of the displaced water: buoyancy over gravity, or without gravity the mass of a neutral vehicle."""
+    """Mass (n,) [kg] of the displaced water: buoyancy divided by gravity; without gravity, that of a neutral vehicle."""
     g = p["environment.gravity"]
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(g > 0.0, p["vehicle.buoyancy"] / g, dry_mass(p))
 
 
 def center_of_mass(p: Numbers) -> np.ndarray:
-    """Centre of the rigid body's mass (n, 3) [m] from the user's origin; zero, (1, 3), for a vehicle in the simple form."""
+    """Centre of mass (n, 3) [m] of the rigid body from the user's origin; zero, (1, 3), for the simple form."""
     if "vehicle.rigid_body_mass_matrix" in p:
         rigid = p["vehicle.rigid_body_mass_matrix"]
         return np.asarray(-inertias.vee(rigid[:, :3, 3:]) / rigid[:, 0, 0, None])
@@ -345,9 +345,9 @@ def center_of_mass(p: Numbers) -> np.ndarray:
 
 
 def added_blocks(p: Numbers) -> inertias.Blocks:
-    """Added mass about the user's origin, blocks of (1 or n, 3, 3) each.
+    """Added mass about the user's origin, as blocks of (1 or n, 3, 3).
 
-    Those of the coupling and of the rates are zero for a vehicle in the simple form.
+    The blocks of the coupling and of the rotation are zero for a vehicle in the simple form.
     """
     if "vehicle.rigid_body_mass_matrix" in p:
         return inertias.blocks(p["vehicle.added_mass_matrix"])
@@ -355,5 +355,5 @@ def added_blocks(p: Numbers) -> inertias.Blocks:
 
 
 def lopsided(p: Numbers) -> bool:
-    """Whether some member's centre of mass is not the user's origin, or added mass couples velocities and rates there."""
+    """Whether some member's centre of mass is off the user's origin, or added mass couples velocities and rates there."""
     return bool(np.any(center_of_mass(p)) or np.any(added_blocks(p).C))

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Robustness of controllers (how robust): sweeps, searches, linear models and their margins."""
+"""Robustness of controllers: sweeps, searches, linear models and their margins."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Final states and memory of a run's members: all that another run needs to continue as if it were one."""
+"""Final states and memory of a run's members: all data that another run needs to continue seamlessly."""
 
 from __future__ import annotations
 
@@ -30,22 +30,23 @@ MOST_DRIFT = 0.1
 class Final(Summarized):
     """Final states of n members of a run, and the memory of forces, actuators and controllers.
 
-    A run that continues from it with the same scene, members and settings equals one run, to the bit: `lw.solve(...,
-    start=final)`, `lw.prepare(...).states(final)`. With other settings or other numbers of the members it continues from
-    the states and the memory; the same holds after `changed`.
+    A run that continues from it with the same scene, members and settings is bit-identical to a single run:
+    `lw.solve(..., start=final)`, `lw.prepare(...).states(final)`. With other settings or other numbers of the members,
+    or after `changed`, it continues from the states and the memory.
 
     Attributes:
-        time: Time [s], counted from t = 0 of the first run.
+        time: Time [s] since t = 0 of the first run.
         step: Step of the run [s].
         steps: Number of steps from t = 0.
-        states: Arrays of those fields that the run kept, by name: position (n, 3) [m, inertial axes], attitude (n, 3, 3) body
-            to inertial axes, velocity (n, 3) [m/s, body axes], angular_velocity (n, 3) [rad/s, body axes].
-        status: Status of each member, shape (n,): those that failed or were stopped stay where they are.
-        indices: Indices of the members in their ensemble (n,), which key their noise.
+        states: Arrays of the saved fields, by name: position (n, 3) [m, inertial axes], attitude (n, 3, 3) body to
+            inertial axes, velocity (n, 3) [m/s, body axes], angular_velocity (n, 3) [rad/s, body axes].
+        status: Status of each member, shape (n,); members that failed or were stopped keep their states.
+        indices: Indices of the members in their ensemble (n,), which determine their noise.
         seed: Seed of the ensemble.
-        parameters: Parameters of the members by name, each with a leading dimension of 1 or n.
-        lanes: Rows (n, rows) by name as the kernel has them: its state, what is remembered, and outcomes.
-        settings: What `lanes` depends on: method, step, number type and laws; empty where members go on from `states`.
+        parameters: Parameters of the members by name, each with a first dimension of 1 or n.
+        lanes: Rows (n, rows) by name in the form of the kernel: its state, memory and outcomes.
+        settings: Settings on which `lanes` depends: method, step, number type and laws; empty if members continue from
+            `states`.
 
     Methods:
         part: Select members.
@@ -74,7 +75,7 @@ class Final(Summarized):
     settings: Mapping[str, Any] = field(default_factory=dict)
 
     def summary_rows(self) -> tuple[str, Rows]:
-        """Source and content."""
+        """Rows of the summary: source and content."""
         remembered = [name.removeprefix(MEMORY) for name, rows in self.lanes.items() if name.startswith(MEMORY)]
         rows = [
             ("step", f"{self.step:g} s, {self.steps:,} steps"),
@@ -114,13 +115,13 @@ class Final(Summarized):
         return self._kept("angular_velocity")
 
     def part(self, places: Sequence[int] | np.ndarray | slice) -> Final:
-        """Select members, in the order given; one may come several times.
+        """Select members, in the given order; a member may occur several times.
 
         Args:
             places: Positions of the members (m,), counted from 0; a slice; or a mask (n,).
 
         Returns:
-            The end of these members.
+            The final states of these members.
 
         Raises:
             SceneError: If there are no such members (also an IndexError).
@@ -133,17 +134,17 @@ class Final(Summarized):
         )
 
     def changed(self, **states: Any) -> Final:
-        """Give members other states; what they remember stays.
+        """Give members other states; their memory is kept.
 
         Args:
             states: Any of position (n, 3) [m], attitude (n, 3, 3), velocity (n, 3) [m/s] and angular_velocity (n, 3) [rad/s],
                 as in `states`.
 
         Returns:
-            The end with these states.
+            The final states with these changes.
 
         Raises:
-            SceneError: If a name is unknown, or an array has a wrong shape or is no rotation.
+            SceneError: If a name is unknown, an array has a wrong shape, or an attitude is not a rotation.
         """
         faults, n = Faults(), self.members
         arrays = dict[str, np.ndarray]()
@@ -158,7 +159,7 @@ class Final(Summarized):
         return replace(self, states={**self.states, **arrays}, lanes=lanes, settings={})
 
     def to_arrays(self) -> dict[str, np.ndarray]:
-        """Write what `from_arrays` reads, but for numbers and parameters, as arrays.
+        """Convert to the arrays that `from_arrays` reads, without numbers and parameters.
 
         Returns:
             Arrays (n, ...) by name.
@@ -174,7 +175,7 @@ class Final(Summarized):
     def from_arrays(
         cls, arrays: Mapping[str, np.ndarray], numbers: Mapping[str, Any], parameters: Mapping[str, np.ndarray]
     ) -> Final:
-        """Read an end from arrays.
+        """Read final states from arrays.
 
         Args:
             arrays: Arrays by name, as in `to_arrays`; others are ignored.
@@ -182,10 +183,11 @@ class Final(Summarized):
             parameters: Parameters of the members by name.
 
         Returns:
-            The end.
+            The final states.
 
         Raises:
-            SceneError: If something is missing, or is nothing that a run ends with: a status, an index, a shape, an attitude.
+            SceneError: If an entry is missing, or a status, an index, a shape or an attitude cannot be the end of a
+                run.
         """
         mapping_of("arrays", arrays, "arrays by name, as of Final.to_arrays")
         mapping_of("numbers", numbers, f"{', '.join(NUMBERS)}")
@@ -214,13 +216,13 @@ class Final(Summarized):
         return end
 
     def checked(self) -> Final:
-        """The end itself, after a check of what a file could hold.
+        """Return itself after checking values that come from a file.
 
         Returns:
-            This end.
+            This object.
 
         Raises:
-            SceneError: If a number, a status, an index, a shape or an attitude is none that a run ends with.
+            SceneError: If a number, a status, an index, a shape or an attitude cannot be the end of a run.
         """
         faults, remedy = Faults("final."), "give an end that lgvi-warp wrote"
         time, step = faults.number("time", self.time, "s", 0.0), faults.positive("step", self.step)
@@ -280,14 +282,14 @@ class Final(Summarized):
 
 
 def _sums(rows: Any) -> np.ndarray:
-    """A sum (n,) of each member's numbers (n, ...) that changes with each of them."""
+    """Checksum (n,) of each member's numbers (n, ...), which changes with any of them."""
     numbers = np.ascontiguousarray(rows, dtype=np.float64)
     bits = numbers.view(np.int64).reshape(len(numbers), math.prod(numbers.shape[1:]))
     return np.asarray((bits * (2 * np.arange(bits.shape[1]) + 3) ** 7).sum(axis=1))
 
 
 def _whole_numbers(faults: Faults, key: str, values: Any, remedy: str) -> np.ndarray | None:
-    """Whole numbers (n,) of a file; None after noting a fault."""
+    """Whole numbers (n,) from a file; None after adding a fault."""
     array = np.asarray(None if ragged(values) else values)
     if array.ndim == 1 and array.dtype.kind in "iu":
         return array
@@ -298,7 +300,7 @@ def _whole_numbers(faults: Faults, key: str, values: Any, remedy: str) -> np.nda
 def _check_rotations(
     faults: Faults, R: np.ndarray | None, judged: np.ndarray | None = None, limit: float = ORTHOGONAL
 ) -> None:
-    """Note the first attitude (n, 3, 3) that is no rotation; judged: mask of the members to look at, whose NaN are taken."""
+    """Add a fault for the first attitude (n, 3, 3) that is no rotation; judged: mask of members to check, NaN allowed."""
     if R is None:
         return
     good = notation.rotations(R, limit)
@@ -310,7 +312,7 @@ def _check_rotations(
 
 
 def joined_rows(parts: Sequence[Mapping[str, np.ndarray]], counts: Sequence[int]) -> dict[str, np.ndarray]:
-    """Rows by name one after the other, of so many members each; those that are shorter, or absent, end in zeros."""
+    """Concatenate rows by name, of `counts` members each; shorter or missing rows are padded with zeros."""
     rows: dict[str, np.ndarray] = {}
     for name in dict.fromkeys(name for part in parts for name in part):
         pieces = [part.get(name) for part in parts]
@@ -326,7 +328,7 @@ def joined_rows(parts: Sequence[Mapping[str, np.ndarray]], counts: Sequence[int]
 
 
 def joined(ends: Sequence[Final]) -> Final:
-    """The members of several ends of one time, step and scene, one after the other."""
+    """Join final states with the same time, step and scene."""
     if len(ends) == 1:
         return ends[0]
     first, counts = ends[0], [end.members for end in ends]

@@ -15,10 +15,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Shifted:
-    """Members beside which others stand with one number shifted, those of each in a row: what derivatives are taken of.
+    """Members followed by their copies with one number shifted, for derivatives.
 
-    members: each of m members, then the same with a number shifted by OFFSETS steps, for one number after the other.
-    steps: (m, numbers), the unit of the shifts, in that of each number.
+    members: each of m members, then its copies with a number shifted by OFFSETS steps, for one number after the other.
+    steps: (m, numbers), the step of the shifts, in the unit of each number.
     """
 
     members: Members
@@ -29,12 +29,12 @@ class Shifted:
 class Members:
     """Parameters by name, with a leading dimension of 1 (shared) or m (varied), and initial states of m members.
 
-    Positions (m, 3) [m] are in inertial axes, attitudes (m, 3, 3) from body to inertial axes, velocities (m, 3) [m/s] and
-    angular velocities (m, 3) [rad/s] in body axes. Seed and index key a member's random numbers, in a subset as in the whole,
-    unless its normals are given. `starts` has the numbers of the start that vary, (m, ...) as the scene names them:
-    "start.euler_deg"; `weight` (m,) what each counts for in statistics, None where all count alike.
-    shifted: of a run with tangents, what these are taken of.
-    final: where they ended in the run that they go on from; None where they start.
+    Positions (m, 3) [m] are in inertial axes, attitudes (m, 3, 3) from body to inertial axes, velocities (m, 3) [m/s]
+    and angular velocities (m, 3) [rad/s] in body axes. Seed and index determine a member's random numbers, also in a
+    subset, unless its normals are given. `starts` has the varied numbers of the start, (m, ...), by their names in the
+    scene, such as "start.euler_deg"; `weight` (m,) is the weight of each member in statistics, None for equal weights.
+    shifted: for a run with tangents, the shifted copies.
+    final: final states of the run that they continue; None at the start.
     """
 
     parameters: dict[str, np.ndarray]
@@ -56,7 +56,7 @@ class Members:
         return len(self.position)
 
     def at(self, some: slice) -> Members:
-        """Some of the members, views."""
+        """Some of the members, as views."""
         of_each = {
             name: getattr(self, name)[some]
             for name in ("position", "attitude", "velocity", "angular_velocity", "indices")

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Scenes: what is simulated, what varies from member to member, and the files that describe both."""
+"""Scenes, ensembles of varied members, and the scene files that describe both."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The columns of a model: their names and order, and those that a user gives by name."""
+"""The columns of a model: their names, their order, and selection of columns that a user gives by name."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from lgvi_warp.scene.variations import MATRICES, Target, Variation, targets
 
 
 def names_of(faults: Faults, vary: Any, argument: str = "vary") -> tuple[str, ...]:
-    """Check and normalise a list of names without distributions; argument: what lists them, for faults."""
+    """Check and normalise a list of names without distributions; argument: name of the list in error messages."""
     listed = [vary] if isinstance(vary, str) else items_of(vary)
     if not listed or not all(isinstance(name, str) for name in listed):
         remedy = (
@@ -33,7 +33,7 @@ def names_of(faults: Faults, vary: Any, argument: str = "vary") -> tuple[str, ..
 
 
 def as_given(fleet: Ensemble) -> list[Variation]:
-    """List what varies in the order of `vary`, and then what the sampling itself varies."""
+    """List the variations in the order of `vary`, followed by those of the sampling itself."""
     place = {key: number for number, key in enumerate(fleet.vary)}
     return sorted(fleet.variations, key=lambda variation: place.get(variation.key, len(place)))
 
@@ -50,7 +50,7 @@ def whole_columns(
 ) -> dict[str, np.ndarray]:
     """Select one column (n,) for each name from data given by label; none after a fault.
 
-    by_label: label -> (n,), or (n, *shape) of a whole number that the names hold the entries of.
+    by_label: {label: (n,)}, or (n, *shape) for an array whose entries are named.
     """
     columns: dict[str, np.ndarray] = {}
     labels: list[str] = []
@@ -78,7 +78,7 @@ def whole_columns(
 def _entries(
     faults: Faults, key: str, array: np.ndarray, entries: Mapping[str, Target], full: np.ndarray
 ) -> dict[str, np.ndarray]:
-    """Select the entries (n,) that vary from the array (n, *shape) of a whole number, by name."""
+    """Select the varied entries {name: (n,)} from the array (n, *shape) of all entries of a number."""
     if array.shape[1:] != full.shape or array.ndim == 0:
         shape = ", ".join(map(str, full.shape))
         faults.add(f'X["{key}"]', "...", f"has shape {array.shape}", f"give an array of shape (n, {shape})")

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Members beside which others stand with one number shifted: from what a kernel is given of them follow its derivatives.
+"""Members with shifted copies, in which one number differs: their kernel inputs give derivatives of these inputs.
 
-What a scene's numbers become in the kernel, such as inertia about another origin, is smooth but long: its derivatives are
-taken by central differences of six points, whose error at a step of 0.2 % is that of round-off, some 1e-13.
+The kernel's inputs, such as inertia about another origin, are smooth but long functions of a scene's numbers. Their
+derivatives are central differences of six points, whose error at a step of 0.2 % is round-off, about 1e-13.
 """
 
 from __future__ import annotations
@@ -37,8 +37,8 @@ STEP, LEAST_PART = 2e-3, 1e-2
 class Copies:
     """The shifted copies of an ensemble's members.
 
-    targets: the numbers, in order. ensemble: each member, then its copies. steps: (members, targets), as in `Shifted`.
-    surveyed: the copies by which the kernel is chosen, where it is to serve other numbers too; else those of `ensemble`.
+    targets: The shifted numbers, in order. ensemble: Each member followed by its copies. steps: (members, targets), as in
+    `Shifted`. surveyed: The copies that determine the kernel, if it is to serve further numbers; else `ensemble`.
     """
 
     targets: tuple[Target, ...]
@@ -53,9 +53,9 @@ class Copies:
 
 
 def with_copies(fleet: Ensemble, keys: Sequence[str], surveyed: Ensemble | None = None) -> Ensemble:
-    """The same members, beside which others stand with some numbers shifted.
+    """The same members, each followed by copies with one number shifted.
 
-    keys: names of the numbers, each one number. surveyed: the same with more numbers, which one kernel is to serve.
+    keys: Names of single numbers. surveyed: The same with more numbers, if one kernel is to serve all of them.
     """
     ensemble = copy.copy(fleet)
     copies = copies_of(fleet, keys)
@@ -69,7 +69,7 @@ def repeats(targets: int) -> int:
 
 
 def targets_of(fleet: Ensemble, keys: Sequence[str]) -> tuple[Target, ...]:
-    """The numbers that names mean; refuse all that are none, or several."""
+    """The single numbers that names refer to; refuse a name of no number or of several."""
     faults = Faults("tangents.")
     values = fleet.numbers(0, 1)
     listed = []
@@ -96,7 +96,7 @@ def _entry(target: Target, shapes: dict[str, Any]) -> str:
 
 
 def copies_of(fleet: Ensemble, keys: Sequence[str]) -> Copies:
-    """Each member of a fleet, and beside it the same with each of these numbers shifted."""
+    """Each member of a fleet, followed by copies with each of these numbers shifted in turn."""
     targets = targets_of(fleet, keys)
     each, n = repeats(len(targets)), fleet.members
     values = fleet.numbers(0, n)
@@ -128,7 +128,7 @@ def _check_finite(values: dict[str, np.ndarray], targets: Sequence[Target]) -> N
 
 
 def _step(values: np.ndarray, target: Target, members: int) -> np.ndarray:
-    """Steps (members,) of a number."""
+    """Difference steps (members,) of a number."""
     largest = np.abs(values).reshape(len(values), -1).max(axis=1)
     index: tuple[Any, ...] = target.index or ()
     size = np.maximum(np.abs(values[:, *index]), LEAST_PART * largest)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Draws of a scene's noise and sensors in a run."""
+"""Layout of the random draws of a scene's noise and sensors in a run."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from lgvi_warp.scene.like import SceneLike
 
 
 def draw_layout(scene: SceneLike, varied: Collection[str], grid: TimeGrid) -> DrawLayout:
-    """The draws of every term and sensor that may draw.
+    """The draws of every term and sensor that may use random numbers.
 
-    varied: names of what varies, as of Ensemble.varied_names: a strength that is 0 in the scene may not be 0 for a member.
+    varied: Names of varied numbers, as in Ensemble.varied_names. A strength that is 0 in the scene may differ for a member.
     """
 
     def acting(term: Term) -> set[str]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Sources of the members' numbers, and the numbers themselves, drawn block by block."""
+"""Sources of the members' numbers, and their values, drawn block by block."""
 
 from __future__ import annotations
 
@@ -33,14 +33,14 @@ Columns = Sequence[tuple[Target, np.ndarray]]
 
 @dataclass(frozen=True, eq=False)
 class SceneNumbers:
-    """The numbers of a scene by name: its parameters, and those of the start, unless these are given for each member."""
+    """The numbers of a scene by name: its parameters, and the start unless starts are given for each member."""
 
     parameters: Mapping[str, np.ndarray]
     start: Mapping[str, Any]
 
     @functools.cached_property
     def arrays(self) -> dict[str, np.ndarray]:
-        """All of them as arrays (1, ...)."""
+        """All numbers as arrays (1, ...)."""
         return {name: np.asarray(value)[None] for name, value in {**self.parameters, **self.start}.items()}
 
     @functools.cached_property
@@ -51,13 +51,13 @@ class SceneNumbers:
 
 @dataclass(frozen=True, eq=False)
 class Draws:
-    """The numbers of members: of the scene, given as arrays, by columns of a table, or drawn, each in place of those before.
+    """The numbers of members, from four sources: scene, arrays, columns of a table, draws. Later sources override earlier.
 
-    A member's numbers follow from its position in the whole ensemble alone.
+    A member's numbers depend only on its position in the whole ensemble.
 
-    explicit: arrays (total, ...) by name; those of the start begin with "start.". columns: what a table sets, (total, ...).
-    weights: (total,), what each counts for in statistics; None: alike.
-    total: number of members of the whole ensemble. places: (members,), where these members are in it; None for all in order.
+    explicit: Arrays (total, ...) by name; names of the start begin with "start.". columns: Values (total, ...) of a table.
+    weights: Statistical weights (total,); None for equal weights.
+    total: Number of members of the whole ensemble. places: Positions (members,) of these members in it; None for all.
     """
 
     scene: SceneNumbers
@@ -84,18 +84,18 @@ class Draws:
 
     @functools.cached_property
     def drawn_names(self) -> set[str]:
-        """Names of what distributions draw."""
+        """Names of the numbers that distributions draw."""
         return {target.name for variation in self.variations for target in variation.targets}
 
     @functools.cached_property
     def varied_names(self) -> set[str]:
-        """Names of what members have of their own: drawn, from columns or explicit."""
+        """Names of the numbers that differ between members: drawn, from columns, or explicit."""
         return self.drawn_names | {target.name for target, _ in self.columns} | self.explicit.keys()
 
     def values(self, first: int, stop: int, start: bool = True) -> dict[str, np.ndarray]:
-        """The numbers of the members first to stop - 1 by name, with those of the start or without; shared ones are (1, ...).
+        """The numbers of members first to stop - 1 by name, with or without the start; shared numbers are (1, ...).
 
-        Those of few members are drawn once and kept: a run reads them several times.
+        Numbers of few members are kept, since a run reads them several times.
         """
         if self.members > KEPT:
             return self._drawn(first, stop, start)
@@ -119,39 +119,39 @@ class Draws:
 
     @functools.cached_property
     def _start_names(self) -> tuple[str, ...]:
-        """Names of what members have at the start."""
+        """Names of the members' numbers of the start."""
         return tuple(name for name in {**self.scene.start, **self.explicit} if name.startswith("start."))
 
     @functools.cached_property
     def varied_starts(self) -> tuple[str, ...]:
-        """Names of what members have of their own at the start."""
+        """Names of the numbers of the start that differ between members."""
         return tuple(name for name in self._start_names if name in self.varied_names)
 
     def with_columns(self, columns: Columns) -> Draws:
-        """The draws of other members, of which a table's columns have other values; the targets are the same."""
+        """Draws with other values in the table's columns; the targets are the same."""
         draws = object.__new__(Draws)  # in a third of the time of `replace`
         vars(draws).update(self._of_tables, columns=columns, total=len(columns[0][1]), _before=self._latest)
         return draws
 
     @functools.cached_property
     def _of_tables(self) -> dict[str, Any]:
-        """Entries that draws of one table share, whatever the values of its columns."""
+        """Attributes that draws of one table share for any values of its columns."""
         names = ("drawn_names", "varied_names", "_start_names", "varied_starts")
         known = self.__getstate__() | {name: getattr(self, name) for name in names}
         return known | {"places": None, "weights": None}
 
     def note_sound(self, draws: Draws) -> None:
-        """Note that the members of another table are physical."""
+        """Record that the members of another table are physical."""
         vars(self)["_latest"] = draws._few if draws.members <= KEPT else {}
 
     @property
     def known_sound(self) -> set[str]:
-        """Names of what has the values of members that were found sound."""
+        """Names of the numbers whose values were already checked as physical."""
         before = self._before if self._before and self.members <= KEPT else {}
         return {name for name, values in before.items() if self._few[name] is values}
 
     def _drawn(self, first: int, stop: int, start: bool) -> dict[str, np.ndarray]:
-        """Draw what `values` returns."""
+        """Compute the result of `values`."""
         base, of_scene = self.scene.parameters, self.scene.arrays
         values = of_scene.copy() if start else {name: of_scene[name] for name in base}
         if self.explicit:
@@ -175,13 +175,13 @@ class Draws:
         return values
 
     def weights_of(self, first: int, stop: int) -> np.ndarray | None:
-        """Weights of members first to stop - 1 in statistics, (stop - first,); None where all count alike."""
+        """Statistical weights of members first to stop - 1, (stop - first,); None for equal weights."""
         if self.weights is None:
             return None
         return self.weights[slice(first, stop) if self.places is None else self.places[first:stop]]
 
     def levels_of(self, first: int, stop: int) -> Mapping[str, np.ndarray]:
-        """Levels in (0, 1) that distributions draw members first to stop - 1 from, (stop - first, size) by key."""
+        """{key: levels in (0, 1) (stop - first, size)} from which distributions draw members first to stop - 1."""
         members = np.arange(first, stop) if self.places is None else self.places[first:stop]
         return self.sampling.draw(self.space, members) if self.variations else {}
 
@@ -193,7 +193,7 @@ class Draws:
         weight: np.ndarray | None = None,
         given: GivenDraws | None = None,
     ) -> Members:
-        """Members from all their numbers by name, which loses those of the start; given: their noise, None for counters'."""
+        """Members from their numbers by name; numbers of the start are removed from `values`. given: Noise, None: drawn."""
         m = len(indices)
         own = {name: values[name] for name in self.varied_starts}
         start = {key.removeprefix("start."): values.pop(key) for key in self._start_names}
@@ -209,19 +209,19 @@ class Draws:
         return Members(values, position, R, nu, Om, indices, seed, own, weight, given=given)
 
     def _attitude(self, start: Mapping[str, np.ndarray]) -> np.ndarray:
-        """Rotation matrices (1 or m, 3, 3) of some members; one that members share is computed once."""
+        """Rotation matrices (1 or m, 3, 3) of some members; a shared attitude is computed once."""
         shared = self.varied_names.isdisjoint(f"start.{way}" for way in ATTITUDES)
         return self.scene.attitude if shared else resolve_attitude(start)
 
 
 def _same_or_copy(values: np.ndarray, before: np.ndarray | None) -> np.ndarray:
-    """The array before if it has the same bits, since what follows from numbers is known by their arrays; else a copy."""
+    """The array `before` if it has the same bits, so that results cached by array are found again; else a copy."""
     same = before is not None and (before.shape, before.dtype) == (values.shape, values.dtype)
     return before if same and before.tobytes() == values.tobytes() else values.copy()  # type: ignore[union-attr,return-value]
 
 
 def _of_each(values: np.ndarray, members: int) -> np.ndarray:
-    """Return values (1 or n, ...) as those of n members, which nobody writes into."""
+    """Return values (1 or n, ...) as a read-only array for n members."""
     if len(values) == members:
         values = values.view()
         values.flags.writeable = False
@@ -230,7 +230,7 @@ def _of_each(values: np.ndarray, members: int) -> np.ndarray:
 
 
 def draws_of(scene: SceneLike, settings: EnsembleSettings, explicit: Mapping[str, np.ndarray]) -> Draws:
-    """The draws that settings describe, or of members whose states are given; refuse what does not fit the scene."""
+    """The draws for the settings, or for members with given states; refuse settings that do not fit the scene."""
     faults = Faults("ensemble.vary.")
     base, sampling = scene.parameters(), settings.sampling
     columns, designed = sampling.own_values(), sampling.distributions()
@@ -264,7 +264,7 @@ def draws_of(scene: SceneLike, settings: EnsembleSettings, explicit: Mapping[str
 
 
 def _turned_by_matrix(faults: Faults, start: dict[str, Any], keys: Sequence[str]) -> dict[str, Any]:
-    """The start with its attitude as a matrix, whatever form it has, if the attitude itself is among what varies."""
+    """The start, with its attitude as a matrix if the attitude itself varies."""
     names = {target.name for key in keys for target in variations.targets(key)}
     if variations.ATTITUDE not in names:
         return start
@@ -277,7 +277,7 @@ def _turned_by_matrix(faults: Faults, start: dict[str, Any], keys: Sequence[str]
 
 
 def _column(tables: Faults, key: str, column: Any, known: Mapping[str, np.ndarray]) -> tuple[Target, np.ndarray] | None:
-    """Target of a table's column, and its values; None after a fault in the name."""
+    """The target and the values of a table's column; None after a fault in the name."""
     (target, *more), also = variations.targets(key), f'; or leave it out: ignore = ["{cut(key)}"]'
     if more:
         tables.add(f'"{key}"', "...", "names several numbers", "give each a column of its own")
@@ -293,7 +293,7 @@ def _column(tables: Faults, key: str, column: Any, known: Mapping[str, np.ndarra
 
 
 def counted(sampling: Sampling, space: Space, members: int | None) -> int:
-    """The number of members: as asked for, or None for what the sampling has; raise SceneError where it cannot have it."""
+    """The number of members: as given, or that of the sampling for None. Raises SceneError if it does not fit the sampling."""
     faults = Faults("ensemble.")
     designed, group = sampling.own_members(space), sampling.group_size(space)
     total = int(members or designed or group)

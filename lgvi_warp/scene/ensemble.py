@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Ensembles: what varies from member to member, and the members' numbers, block by block."""
+"""Ensembles: variations between members, and the members' numbers, block by block."""
 
 from __future__ import annotations
 
@@ -34,54 +34,55 @@ if TYPE_CHECKING:
 
 
 class Ensemble(Summarized, Documented):
-    """A scene and what varies in it from member to member.
+    """A scene and the numbers that vary between its members.
 
-    A member's numbers depend on the seed, its index and the varied names alone, not on the block, subset or order in
-    which they are drawn.
+    A member's numbers depend only on the seed, its index and the varied names, not on the block, subset or order in which
+    they are drawn.
 
-    Names of what varies:
+    These names can vary:
 
-    * every number of the scene, as `scene.parameters()` lists them: "vehicle.mass", "drag.quadratic" (a term's name or
-      type, and its field), ...
-    * what the scene's start gives: "start.position", "start.angular_velocity", ..., and always "start.attitude";
+    * every number that `scene.parameters()` lists: "vehicle.mass", "drag.quadratic" (a term's name or type, and its
+      field), ...
+    * the numbers that the scene's start gives: "start.position", "start.angular_velocity", ..., and always
+      "start.attitude";
     * one entry of these: "start.position[2]";
-    * several that one distribution draws together: "vehicle.mass, vehicle.buoyancy".
+    * several numbers that one distribution draws jointly: "vehicle.mass, vehicle.buoyancy".
 
-    A distribution of a vector applies to each entry; of a symmetric matrix, to the entries on and above the diagonal
-    (only those on it, where the matrix is diagonal).
+    A distribution for a vector applies to each entry. A distribution for a symmetric matrix applies to the entries on and
+    above the diagonal, or only on the diagonal if the matrix is diagonal.
 
     Args:
-        scene: The scene that the members vary.
+        scene: The scene whose numbers vary.
         members: Number of members, >= 1; None for as many as the sampling has, or 1 (default).
         seed: Whole number >= 0; by default 0.
-        vary: Distributions by name, of lgvi_warp or frozen ones of scipy.stats; None if nothing varies (default).
+        vary: {name: distribution}, of lgvi_warp or frozen distributions of scipy.stats; None if nothing varies (default).
         sampling: "random" (default), "sobol", "halton", "saltelli", lw.designs.LatinHypercube(...), lw.designs.Grid(...),
             lw.designs.Table(...) and others, or a table as in a scene file.
 
     Attributes:
-        indices: Indices of these members in the whole ensemble, (members,).
+        indices: Indices of these members in the ensemble from which they were selected, (members,).
         final: Final states of the run that these members continue; None for members that start at t = 0.
         replicates: Number of independent replicates of the sampling.
 
     Methods:
         parameters: Parameters of some members by name.
-        numbers: All numbers of some members, those of the start too.
-        starts: Numbers of the start that vary, of some members.
+        numbers: All numbers of some members, including the start.
+        starts: Varied numbers of the start of some members.
         levels: Levels in (0, 1) from which distributions draw.
         weights: Statistical weights of some members.
         select: Parameters and initial states of some members.
         varied: Names of the parameters that vary.
-        member: One member as an ensemble of its own.
-        subset: Some members as an ensemble of their own.
-        with_seed: Members drawn from the same distributions by another seed.
+        member: One member as a separate ensemble.
+        subset: Some members as a separate ensemble.
+        with_seed: Members drawn from the same distributions with another seed.
         going_on: These members, continued from the end of a run.
         from_scene: The ensemble that a scene file describes.
-        from_states: An ensemble of given states and parameters.
+        from_states: An ensemble with given states and parameters.
         to_dict: The section [ensemble] of a scene file.
 
     Raises:
-        SceneError: If anything is wrong; the message lists every fault. Unphysical members are counted, and the first
-            of them is shown.
+        SceneError: If an argument is invalid; the message lists every fault, the number of unphysical members, and the first
+            of them.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -122,7 +123,7 @@ class Ensemble(Summarized, Documented):
         self._setup(scene, EnsembleSettings(members, seed, dict(vary or {}), sampling), {})
 
     def summary_rows(self) -> tuple[str, summaries.Rows]:
-        """Sampling, what varies and the scene's own rows."""
+        """Rows of the summary: sampling, variations, and the scene's rows."""
         varied = [(f"varies {name}", brief(distribution.to_dict())) for name, distribution in self.vary.items()]
         rows = [("sampling", f"{self.sampling.kind}, seed {self.seed}"), *varied]
         scene_rows = self.scene.summary_rows()[1] if isinstance(self.scene, Summarized) else ()
@@ -133,8 +134,8 @@ class Ensemble(Summarized, Documented):
         """Build the ensemble that settings describe.
 
         Args:
-            scene: The scene that the members vary.
-            settings: Members, seed, distributions and sampling. Where they name indices, only those members are taken.
+            scene: The scene whose numbers vary.
+            settings: Members, seed, distributions and sampling. If they name indices, only these members are used.
 
         Returns:
             The ensemble.
@@ -160,7 +161,7 @@ class Ensemble(Summarized, Documented):
             scene: The scene, with its ensemble_settings.
 
         Returns:
-            The ensemble; of one member if the scene has no ensemble_settings.
+            The ensemble. It has one member if the scene has no ensemble_settings.
 
         Raises:
             SceneError: If the settings do not fit the scene, or a member is unphysical.
@@ -180,23 +181,23 @@ class Ensemble(Summarized, Documented):
     ) -> Ensemble:
         """Build an ensemble of members with given states and parameters.
 
-        States that are not finite are accepted: the run marks such members as failed.
+        States that are not finite are accepted; the run marks these members as failed.
 
         Args:
-            scene: The scene that the members vary.
+            scene: The scene of the members.
             position: Positions (n, 3) [m], inertial axes (north, east, down).
             attitude: Rotation matrices (n, 3, 3), body to inertial.
             velocity: Velocities (n, 3) [m/s], body axes.
             angular_velocity: Angular velocities (n, 3) [rad/s], body axes.
-            parameters: Arrays of length n by name, with names as in `vary`, also of single entries
-                ("current.velocity[0]"); "vehicle.inertia" as (n, 3) or (n, 3, 3). Or a data frame, a structured array
-                or an xarray Dataset with such names. None if no parameter varies (default).
+            parameters: {name: array of length n}, with names as in `vary`, also of single entries ("current.velocity[0]");
+                "vehicle.inertia" as (n, 3) or (n, 3, 3). A data frame, a structured array or an xarray Dataset with
+                these names is accepted, too. None if no parameter varies (default).
 
         Returns:
             The ensemble of n members.
 
         Raises:
-            SceneError: If an array holds no real numbers, has a wrong shape or unphysical values.
+            SceneError: If an array does not hold real numbers, has a wrong shape, or has unphysical values.
         """
         states = position, attitude, velocity, angular_velocity
         n, explicit = given_members(scene.parameters(), *states, parameters)
@@ -246,7 +247,7 @@ class Ensemble(Summarized, Documented):
 
     @property
     def indices(self) -> np.ndarray:
-        """Indices (members,) of these members in the whole ensemble, by which their noise is keyed."""
+        """Indices (members,) of these members in the whole ensemble; they determine the members' noise."""
         if self._indices is not None:
             return self._indices
         return np.arange(self.members) if self._draws.places is None else self._draws.places
@@ -272,7 +273,7 @@ class Ensemble(Summarized, Documented):
         return PhysicalChecks(self.scene, varied, self._draws.drawn_names, self.members)
 
     def _check_physical(self, before: bool = False) -> None:
-        """Refuse unphysical members up to SURVEYED of those that are drawn; a run looks at the others as it comes to them."""
+        """Refuse unphysical members among the first SURVEYED ones; a run checks the others block by block."""
         checks, draws = self._checks(), self._draws
         all_of_them = draws.explicit or draws.columns or not checks.varied
         self.checked = self.members if all_of_them else min(self.members, SURVEYED)
@@ -280,12 +281,12 @@ class Ensemble(Summarized, Documented):
             checks.of_members(self.parameters, self.checked)
 
     def check_block(self, first: int, stop: int, parameters: Mapping[str, np.ndarray]) -> None:
-        """Check that members are physical, as far as that was not checked before.
+        """Check that members are physical, unless they were checked before.
 
         Args:
             first: Position of the first member.
             stop: Position after the last member.
-            parameters: Their parameters by name.
+            parameters: Parameters of these members by name.
 
         Raises:
             SceneError: If a member is unphysical; the message names the first of them.
@@ -295,7 +296,7 @@ class Ensemble(Summarized, Documented):
 
     @staticmethod
     def own(term: Any, parameters: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-        """Return the numbers of one term out of those of all.
+        """Return the numbers of one term, selected from those of all terms.
 
         Args:
             term: A term or an event.
@@ -317,7 +318,7 @@ class Ensemble(Summarized, Documented):
             stop: Position after the last member.
 
         Returns:
-            Values by name, (stop - first, ...) or, where all members share them, (1, ...).
+            Values by name, (stop - first, ...), or (1, ...) for values that all members share.
         """
         return self._values(first, stop, start=False)
 
@@ -329,19 +330,19 @@ class Ensemble(Summarized, Documented):
             stop: Position after the last member.
 
         Returns:
-            Levels (stop - first, size) by key of what varies, as `space` has them.
+            {key of a variation: levels (stop - first, size)}, in the order of `space`.
         """
         return self._draws.levels_of(first, stop)
 
     def numbers(self, first: int, stop: int) -> dict[str, np.ndarray]:
-        """Return all numbers of some members, those of the start too.
+        """Return all numbers of some members, including the start.
 
         Args:
             first: Position of the first member.
             stop: Position after the last member.
 
         Returns:
-            Values by name, (stop - first, ...) or, where all members share them, (1, ...).
+            Values by name, (stop - first, ...), or (1, ...) for values that all members share.
         """
         return self._values(first, stop)
 
@@ -353,11 +354,11 @@ class Ensemble(Summarized, Documented):
             stop: Position after the last member.
 
         Returns:
-            The members' numbers, n = stop - first: parameters by name; position (n, 3) [m], attitude (n, 3, 3),
+            Numbers of n = stop - first members: parameters by name; position (n, 3) [m], attitude (n, 3, 3),
             velocity (n, 3) [m/s, body axes] and angular velocity (n, 3) [rad/s, body axes].
 
         Raises:
-            SceneError: If there are no such members (also an IndexError).
+            SceneError: If these members do not exist (also an IndexError).
         """
         if not (is_whole(first, 0, self.members - 1) and is_whole(stop, int(first) + 1, self.members)):
             raise NoSuchMembers(
@@ -376,26 +377,26 @@ class Ensemble(Summarized, Documented):
         return replace(members, final=final, **states)
 
     def from_zero(self) -> Ensemble:
-        """Return these members as they start at t = 0.
+        """Return these members with their start at t = 0.
 
         Returns:
-            The ensemble, without the end of another run.
+            The ensemble; it does not continue another run.
         """
         ensemble = copy.copy(self)
         ensemble.final, ensemble.start_time = None, 0.0
         return ensemble
 
     def going_on(self, final: Final) -> Ensemble:
-        """Return these members as they go on from where a run of them ended.
+        """Return these members, continued from the end of a run of them.
 
         Args:
-            final: The end of that run, of as many members.
+            final: Final states of that run, with the same number of members.
 
         Returns:
-            The ensemble, which starts at the time and in the states of that end.
+            The ensemble, which starts at the time and in the states of `final`.
 
         Raises:
-            SceneError: If it is no end of a run, or of another number of members.
+            SceneError: If `final` is not the end of a run, or has another number of members.
         """
         from lgvi_warp.sampling.final import Final
 
@@ -409,14 +410,14 @@ class Ensemble(Summarized, Documented):
         return ensemble
 
     def weights(self, first: int, stop: int) -> np.ndarray | None:
-        """Return what some members count for in statistics.
+        """Return the statistical weights of some members.
 
         Args:
             first: Position of the first member.
             stop: Position after the last member.
 
         Returns:
-            Weights (stop - first,), of mean 1 over the table that gives them; None where all members count alike.
+            Weights (stop - first,), with the mean 1 over the table that gives them; None for equal weights.
         """
         return self._draws.weights_of(first, stop)
 
@@ -424,31 +425,31 @@ class Ensemble(Summarized, Documented):
         """Return the names of the parameters that vary from member to member.
 
         Returns:
-            Names in the order of `scene.parameters()`; those of the start are not among them.
+            Names in the order of `scene.parameters()`, without numbers of the start.
         """
         varied = self.varied_names
         return [name for name in self._draws.scene.parameters if name in varied]
 
     def varied_starts(self) -> list[str]:
-        """Return the names of the numbers of the start that vary from member to member, such as "start.position"."""
+        """Return the names of the numbers of the start that vary between members, such as "start.position"."""
         return list(self._draws.varied_starts)
 
     def starts(self, first: int, stop: int) -> dict[str, np.ndarray]:
-        """Return the numbers of the start that vary, of some members.
+        """Return the varied numbers of the start of some members.
 
         Args:
             first: Position of the first member.
             stop: Position after the last member.
 
         Returns:
-            Values by name, (stop - first, ...): whole numbers, also where one entry varies.
+            Values by name, (stop - first, ...), with all entries of a number even if only one entry varies.
         """
         values = self._values(first, stop) if self._draws.varied_starts else {}
         return {name: values[name] for name in self._draws.varied_starts}
 
     @property
     def varied_names(self) -> set[str]:
-        """Names of what members have of their own: drawn, from columns or explicit."""
+        """Names of the numbers that differ between members: drawn, from columns, or explicit."""
         varied = self._draws.varied_names
         return varied if self.copies is None else varied | self.copies.surveyed.varied_names
 
@@ -458,16 +459,16 @@ class Ensemble(Summarized, Documented):
         return not self.varied_names <= self._draws.scene.parameters.keys()
 
     def subset(self, indices: Sequence[int] | np.ndarray | slice) -> Ensemble:
-        """Return some members as an ensemble of their own, with the same numbers.
+        """Return some members as a separate ensemble, with the same numbers.
 
         Args:
-            indices: Positions of the members (k,), counted from 0, in the order wanted; a slice; or a mask (members,).
+            indices: Positions of the members (k,), counted from 0, in any order; a slice; or a mask (members,).
 
         Returns:
             The ensemble of k members.
 
         Raises:
-            SceneError: If this names no members, or some that there are not (also an IndexError).
+            SceneError: If `indices` names no members, or members that do not exist (also an IndexError).
         """
         chosen = members_of("members", indices, self.members)
         places = chosen if self._draws.places is None else self._draws.places[chosen]
@@ -485,7 +486,7 @@ class Ensemble(Summarized, Documented):
         return ensemble
 
     def _drawing(self, **changes: Any) -> Ensemble:
-        """Return a copy whose numbers are drawn in another way."""
+        """Return a copy with changed draws."""
         ensemble = copy.copy(self)
         ensemble._draws = replace(self._draws, **changes)
         return ensemble
@@ -494,7 +495,7 @@ class Ensemble(Summarized, Documented):
         """Return the same members with other noise.
 
         Args:
-            given: Standard normals of each, or one row of them for all; None for those of counters.
+            given: Standard normal numbers of each member, or one row for all; None for those drawn from counters.
 
         Returns:
             The ensemble.
@@ -504,11 +505,11 @@ class Ensemble(Summarized, Documented):
         return ensemble
 
     def given_as_arrays(self, arrays: Mapping[str, np.ndarray], repeats: int) -> Ensemble:
-        """Return each member several times in a row, with numbers that nobody checks.
+        """Return each member several times in a row, with unchecked numbers.
 
         Args:
-            arrays: (members times repeats, ...) by name, of every number that differs from member to member.
-            repeats: How often each member stands there, with the same noise.
+            arrays: {name: (members times repeats, ...)} of every number that differs between members.
+            repeats: Number of copies of each member, which have the same noise.
 
         Returns:
             The ensemble.
@@ -522,10 +523,10 @@ class Ensemble(Summarized, Documented):
         return ensemble
 
     def with_columns(self, columns: Mapping[str, np.ndarray]) -> Ensemble:
-        """Return an ensemble of other members, of which a table's columns have other values.
+        """Return an ensemble with other values in the columns of its table.
 
         Args:
-            columns: Values (n, ...) by label of what the table of this ensemble sets, such as "start.position[2]".
+            columns: {label: values (n, ...)} of the table's columns, such as "start.position[2]".
 
         Returns:
             The ensemble of n members.
@@ -547,11 +548,11 @@ class Ensemble(Summarized, Documented):
         """Return the same members, in a scene with other terms, events or parts of the controller.
 
         Args:
-            scene: The scene; what varies of it has the names that it had, or is no more.
-            by_member: Names of more numbers that count as varied, since the caller sets them; none by default.
+            scene: The scene. Varied numbers must keep their names, or not exist in it.
+            by_member: Names of further numbers that count as varied, since the caller sets them; none by default.
 
         Returns:
-            The ensemble, whose members have the scene's values of these.
+            The ensemble; its members have the scene's values of the numbers in `by_member`.
         """
         numbers = SceneNumbers(scene.parameters(), self._draws.scene.start)
         shared = ((name, numbers.parameters[name]) for name in by_member)
@@ -562,17 +563,17 @@ class Ensemble(Summarized, Documented):
         return ensemble
 
     def with_seed(self, seed: int, members: int | None = None) -> Ensemble:
-        """Return these members, drawn from the same distributions by another seed.
+        """Return these members, drawn from the same distributions with another seed.
 
         Args:
             seed: Whole number >= 0.
-            members: Number of members, in place of these the first ones of the sampling; None for these (default).
+            members: Number of members, the first ones of the sampling; None (default) for the members of this ensemble.
 
         Returns:
             The ensemble.
 
         Raises:
-            SceneError: If the sampling cannot have so many members, or a member is unphysical.
+            SceneError: If the sampling does not allow this number of members, or a member is unphysical.
         """
         settings = EnsembleSettings(members, seed, self.vary, self.sampling)
         draws, new_seed = self._draws, int(settings.seed)
@@ -591,7 +592,7 @@ class Ensemble(Summarized, Documented):
         return ensemble
 
     def member(self, index: int) -> Ensemble:
-        """Return one member as an ensemble of its own, with bitwise the same numbers.
+        """Return one member as a separate ensemble, with bitwise the same numbers.
 
         Args:
             index: Position of the member.
@@ -600,7 +601,7 @@ class Ensemble(Summarized, Documented):
             The ensemble of one member.
 
         Raises:
-            SceneError: If there is no such member (also an IndexError).
+            SceneError: If the member does not exist (also an IndexError).
         """
         return self.subset(np.array([index if is_whole(index, 0) else -1]))
 
@@ -608,18 +609,18 @@ class Ensemble(Summarized, Documented):
     def replicates(self) -> int:
         """Number r of independent replicates of the sampling: member i belongs to replicate i mod r.
 
-        It is 1 for a subset and for members with given states, which are no design.
+        It is 1 for a subset and for members with given states, since these are not a design.
         """
         is_design = self._draws.places is None and not self._draws.explicit
         return self.sampling.replicates_of_members() if is_design else 1
 
     def explicit(self) -> dict[str, np.ndarray]:
-        """Return the numbers that were given as arrays, which settings do not describe.
+        """Return the numbers that were given as arrays and that settings therefore do not describe.
 
         Returns:
-            Arrays by name, (members of the whole, ...): given states and parameters, the values that the sampling
-            holds, "indices" if they were set, and what `Final.to_arrays` gives where they go on. Empty if there are none of
-            these.
+            Arrays by name, (members of the whole ensemble, ...): given states and parameters, values that the sampling
+            holds, "indices" if they were set, and, for members that continue a run, the arrays of `Final.to_arrays`. Empty
+            if there are none of these.
         """
         indices = {} if self._indices is None else {"indices": np.asarray(self._indices, dtype=np.int64)}
         sampled = {name: values[: self._draws.total] for name, values in self.sampling.arrays().items()}
@@ -630,7 +631,7 @@ class Ensemble(Summarized, Documented):
         """Return the section [ensemble] of a scene file.
 
         Returns:
-            members, seed, vary, sampling and indices as in a scene file, and under "explicit" the names of the numbers
+            members, seed, vary, sampling and indices as in a scene file. The entry "explicit" has the names of the numbers
             that were given as arrays.
         """
         explicit = self._draws.explicit
@@ -639,7 +640,7 @@ class Ensemble(Summarized, Documented):
 
 
 def drawn_by_terms(scene: SceneLike, settings: EnsembleSettings, fixed: Collection[str]) -> dict[str, Any]:
-    """Distributions of what terms draw for each member by themselves, unless it is given, or varies otherwise."""
+    """Distributions of numbers that terms draw for each member, except numbers that are given or varied otherwise."""
     drawn = [f"{term.key}.{name}" for term in scene.terms for name in term.drawn]
     if not drawn:
         return {}
@@ -655,5 +656,5 @@ SURVEYED = 32_768
 
 
 def _is_name(name: Any) -> bool:
-    """Return whether this is a text, or a tuple of texts that one distribution draws together."""
+    """Return whether `name` is a text, or a tuple of texts for one joint distribution."""
     return isinstance(name, str) or (isinstance(name, tuple) and all(isinstance(entry, str) for entry in name))

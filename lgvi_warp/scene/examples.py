@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Scene and sweep files that come with the package, called "example:NAME" where a path of such a file is taken."""
+"""Scene and sweep files that come with the package; "example:NAME" stands for the path of one of them."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ _FOLDERS = ("", "scenes", "sweeps", "validation")
 
 
 def example_files() -> dict[str, Path]:
-    """Path of each file by name; a wheel has them within the package, a clone beside it."""
+    """Path of each file by name; a wheel has them in the package, a clone of the repository next to it."""
     package = Path(__file__).parents[1]
     home = next(place for place in (package / "examples", package.parent / "examples") if place.is_dir())
     return {path.stem: path for part in _FOLDERS for path in sorted((home / part).glob("*.toml"))}
 
 
 def example_title(path: Path) -> str:
-    """The first comment of a file, without the page that it names."""
+    """The first comment of a file, without the reference to a page."""
     comment = re.search(r"# *(.*?)(?:: docs/.*|\.)?$", file_text(path, "scene file"), re.MULTILINE)
     return comment[1] if comment else ""
 
 
 def located(path: str | os.PathLike[str], folder: Path | None = None) -> str | os.PathLike[str]:
-    """The path itself, below a folder if one is given; of "example:NAME" that of the file that comes with the package."""
+    """The path itself, below `folder` if given; for "example:NAME", the path of the file that comes with the package."""
     name = os.fspath(path) if isinstance(path, str | os.PathLike) else ""
     if not isinstance(name, str) or not name.startswith(PREFIX):
         return path if folder is None else folder / path

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Scene files: from a path or a text to tables, with overrides applied and a named vehicle inserted."""
+"""Scene files: conversion of a path or a text to tables, with overrides applied and a named vehicle inserted."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ def tables_of_file(path: str | os.PathLike[str]) -> dict[str, Any]:
 def tables_of_text(
     text: str, settings: Mapping[str, Any] | None = None, name: str = "scene", folder: Path | None = None
 ) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Read the tables of the text of a scene file (TOML), whose relative paths refer to a folder, with some values replaced.
+    """Read the tables from the text of a scene file (TOML), with some values replaced; relative paths refer to a folder.
 
-    Returns: The tables; and the values, by name, of numbers whose names are no keys.
+    Returns: The tables, and {name: value} of settings whose names are not keys of the tables.
     """
     content = parsed(text, name)
     given = {} if settings is None else mapping_of("overrides", settings, "names to values")
@@ -42,7 +42,7 @@ def tables_of_text(
 
 
 def _set_keys(content: dict[str, Any], settings: Mapping[str, Any]) -> dict[str, Any]:
-    """Replace values of keys in the tables of a scene file, in place; return the values of names that are no keys."""
+    """Replace values of keys in the tables of a scene file, in place; return the settings whose names are not keys."""
     faults, others, taken = Faults(), dict[str, Any](), []
     for name, value in settings.items():
         with faults.including():
@@ -59,7 +59,7 @@ def _set_keys(content: dict[str, Any], settings: Mapping[str, Any]) -> dict[str,
 
 
 def _files_in(folder: Path, content: dict[str, Any]) -> dict[str, Any]:
-    """Put relative paths of files that the content names below the folder: a table of members, policies, data, and a mesh."""
+    """Prefix relative paths in the content with the folder: a table of members, policies, data, and a mesh."""
     try:
         ensemble = content["ensemble"]
         sampling = ensemble["sampling"]
@@ -90,12 +90,12 @@ def _files_in(folder: Path, content: dict[str, Any]) -> dict[str, Any]:
 
 
 def _below(folder: Path, part: Any) -> Any:
-    """Return the table of a term, an event or a law, with the path of its file put below the folder."""
+    """Return the table of a term, an event or a law, with the path of its file prefixed with the folder."""
     return part | {"file": os.fspath(folder / part["file"])} if isinstance(part.get("file"), str) else part
 
 
 def _mesh_in(folder: Path, name: str) -> str:
-    """Return the path of a mesh; raise SceneError if it leaves the folder of the scene, through a link too."""
+    """Return the path of a mesh. Raises SceneError if it leaves the folder of the scene, also through a link."""
     key = "vehicle.shape.mesh"
     path = None
     with contextlib.suppress(OSError, ValueError):  # a link out of the folder, or a name with a null character
@@ -126,7 +126,7 @@ def override(content: dict[str, Any], key: str, value: Any) -> None:
 
 
 def _value_of(key: str, text: str) -> Any:
-    """Return what a text says as a TOML value, or the text itself; raise SceneError if it holds several values."""
+    """Return a text parsed as a TOML value, or else the text itself. Raises SceneError if it holds several values."""
     try:
         content = parsed(f"value = {text}", key)
     except SceneError as error:
@@ -145,7 +145,7 @@ def _value_of(key: str, text: str) -> Any:
 def with_named_vehicle(content: Mapping[str, Any]) -> Mapping[str, Any]:
     """Insert the vehicle that [vehicle] name = "remus_100" refers to.
 
-    Keys beside the name replace the vehicle's own values. A term of the same name or type replaces the vehicle's term.
+    Other keys of [vehicle] replace the vehicle's own values. A term of the same name or type replaces the vehicle's term.
     """
     if not isinstance(content, Mapping):
         raise refusal("scene", content, "is not a table", "give tables by section name, as of a scene file")
@@ -170,7 +170,7 @@ def with_named_vehicle(content: Mapping[str, Any]) -> Mapping[str, Any]:
 
 
 def with_origin_of_floors(content: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Complete the tables of floors that are read from a file by the origin of the axes that [environment] says."""
+    """Add the origin of the axes from [environment] to the tables of floors that are read from a file."""
     events, origin = content.get("events"), _entry(content, "environment", "origin")
     if origin is None or not isinstance(events, list | tuple):
         return content
@@ -183,10 +183,10 @@ def with_origin_of_floors(content: Mapping[str, Any]) -> Mapping[str, Any]:
 
 
 def with_times_of_data(content: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Complete the tables of currents that are read from a file by what other sections say.
+    """Add values of other sections to the tables of currents that are read from a file.
 
-    That is the origin of the axes and the moment that is t = 0, of [environment], how long the run lasts, and where members
-    start.
+    These are the origin of the axes and the date and time of t = 0 from [environment], the duration of the run, and the
+    start position of members.
     """
     terms = content.get("terms")
     if not isinstance(terms, list | tuple) or not any(_reads_file(term) for term in terms):
@@ -212,7 +212,7 @@ def _reads_file(term: Any) -> bool:
 
 
 def _entry(content: Mapping[str, Any], section: str, key: str) -> Any:
-    """A value of a section, which is a table or an object; None where there is none."""
+    """A value of a section, which is a table or an object; None if it is missing."""
     table = content.get(section, {})
     return table.get(key) if isinstance(table, Mapping) else getattr(table, key, None)
 

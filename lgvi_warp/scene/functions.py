@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The Python functions and classes of the user's own that a run depends on, and which they are."""
+"""The user's Python functions and classes that a run depends on, and their identities."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from lgvi_warp.statistics.values.quantity import Quantity
 
 
 class Own(NamedTuple):
-    """A function or a class of the user's, and its version by the user; None where nothing is said."""
+    """A function or a class of the user, and its version; None if the user gave no version."""
 
     function: Any
     version: Any
 
 
 def functions_of(fleet: Ensemble | None, statistics: Iterable[Statistic] = ()) -> dict[str, Own]:
-    """List the user's functions and classes that a run, or statistics alone, depends on, which no table can hold."""
+    """List the user's functions and classes that a run or statistics depend on; no table can hold them."""
     functions = {} if fleet is None else dict(_of_fleet(fleet))
     for i, statistic in enumerate(statistics):
         version = getattr(statistic, "version", None)
@@ -34,19 +34,19 @@ def functions_of(fleet: Ensemble | None, statistics: Iterable[Statistic] = ()) -
 
 
 def identities(functions: dict[str, Own]) -> dict[str, str]:
-    """Return which functions these are, by place."""
+    """Return the identities of functions, by their place in the scene."""
     return {place: identity(*function) for place, function in functions.items()}
 
 
 class ToldApart:
-    """Names functions for one call: by what they are and, of those that seem the same, by which object each is."""
+    """Names for functions within one call: an identity, and a number that distinguishes objects of the same identity."""
 
     def __init__(self) -> None:
         # By place in memory, with the function, so that no other one gets the place.
         self._names: dict[tuple[Any, ...], tuple[Own, tuple[str, int]]] = {}
 
     def name(self, own_function: Own) -> tuple[str, int]:
-        """Return what a function is, as it was when it was met first, and which one of its kind in this call."""
+        """Return a function's identity when it was first seen, and its number among functions of the same identity."""
         function = own_function.function
         parts = (function.__self__, function.__func__) if isinstance(function, MethodType) else (function,)
         key = (*map(id, parts), own_function.version)

@@ -25,7 +25,7 @@ def given_members(
     angular_velocity: Any,
     parameters: Any,
 ) -> tuple[int, dict[str, np.ndarray]]:
-    """The arguments of `Ensemble.from_states` as the number n of members and arrays (n, ...) by name; states as "start."."""
+    """Number n of members and arrays (n, ...) by name from the arguments of `Ensemble.from_states`; states are "start."."""
     faults = Faults()
     states = dict(zip(FIELDS, (position, attitude, velocity, angular_velocity), strict=True))
     explicit = {f"start.{key}": _state(faults, key, value) for key, value in states.items()}
@@ -49,7 +49,7 @@ def given_members(
 
 
 def _state(faults: Faults, key: str, value: Any) -> np.ndarray:
-    """A copy of a state in float64, which may hold NaN; later changes of the argument do not reach the ensemble.
+    """A copy of a state in float64, which may hold NaN; later changes of the argument do not affect the ensemble.
 
     A data frame's columns may be called position[0], position[1], position[2], in any order.
     """
@@ -65,13 +65,13 @@ def _state(faults: Faults, key: str, value: Any) -> np.ndarray:
 
 
 def _numbers(faults: Faults, key: str, value: Any) -> np.ndarray:
-    """Numbers of an array; none after a fault."""
+    """Numbers of an array; an empty array after a fault."""
     array = faults.real(key, value, "give an array of numbers")
     return np.empty(0) if array is None else array
 
 
 def _given_parameters(faults: Faults, base: Mapping[str, np.ndarray], arrays: Any, n: int) -> dict[str, np.ndarray]:
-    """Return arrays (n, *shape) by name, from parameters given whole or by their entries."""
+    """Return arrays (n, *shape) by name, from parameters given as arrays or by their entries."""
     if arrays is None or (isinstance(arrays, Mapping) and not arrays):
         return {}
     if not is_labelled(arrays):
@@ -98,7 +98,7 @@ def _given_parameters(faults: Faults, base: Mapping[str, np.ndarray], arrays: An
 
 
 def explicit_parameter(faults: Faults, key: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
-    """Values of a parameter, or of one entry of it, as an array of this shape; of a matrix its diagonal suffices."""
+    """Values of a parameter, or of one entry of it, as an array of this shape; a matrix may be given by its diagonal."""
     array = faults.real(key, value, "give an array of numbers")
     if array is None:
         return np.empty(0)
@@ -113,6 +113,6 @@ def explicit_parameter(faults: Faults, key: str, value: Any, shape: tuple[int, .
 
 
 def _skew(matrices: np.ndarray) -> bool:
-    """Return whether one of the matrices (n, d, d) is not symmetric; those that are not finite are judged elsewhere."""
+    """Return whether one of the matrices (n, d, d) is not symmetric; matrices that are not finite are checked elsewhere."""
     with np.errstate(invalid="ignore"):
         return bool(np.any(np.abs(matrices - np.swapaxes(matrices, 1, 2)) > 1e-9 * np.abs(matrices).max()))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Columns of a table of members that hold places on the Earth, as columns of positions."""
+"""Conversion of columns with geodetic coordinates in a table of members to columns of positions."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ ENTRIES = tuple(f"{PLACE}[{i}]" for i in range(3))
 
 
 def positions_in_place_of_places(columns: Mapping[str, Any], scene: SceneLike) -> Mapping[str, Any]:
-    """Columns by name, of which "start.geodetic" or its entries became "start.position" [m].
+    """Columns by name, with "start.geodetic" or its entries converted to "start.position" [m].
 
-    An entry that no column has is that of the scene's own start.
+    An entry without a column is taken from the scene's start.
     """
     named = [name for name in columns if name.replace(" ", "") in (PLACE, *ENTRIES)]
     faults = Faults("ensemble.sampling.table.")
@@ -31,7 +31,7 @@ def positions_in_place_of_places(columns: Mapping[str, Any], scene: SceneLike) -
 
 
 def _places(faults: Faults, columns: Mapping[str, Any], own: np.ndarray | None) -> np.ndarray:
-    """Latitude, longitude and depth of each member (n, 3), of the columns and else of the scene's start."""
+    """Latitude, longitude and depth of each member (n, 3), from the columns or else from the scene's start."""
     read = {name: faults.finite(f'"{name}"', column, None, PLACE_UNIT) for name, column in columns.items()}
     if faults:
         return np.empty((0, 3))

@@ -15,7 +15,7 @@ from lgvi_warp.scene.start import Environment, Start
 
 @runtime_checkable
 class SceneLike(Protocol):
-    """Protocol of a scene as an ensemble needs it; `Scene` fulfils it."""
+    """Protocol of the parts of a scene that an ensemble needs; `Scene` implements it."""
 
     @property
     def vehicle(self) -> Vehicle:
@@ -27,7 +27,7 @@ class SceneLike(Protocol):
 
     @property
     def terms(self) -> Sequence[Any]:
-        """Terms that act besides weight and buoyancy."""
+        """Terms that act in addition to weight and buoyancy."""
 
     @property
     def events(self) -> Sequence[Any]:
@@ -39,7 +39,7 @@ class SceneLike(Protocol):
 
     @property
     def parts(self) -> Sequence[Any]:
-        """Everything that has numbers of its own: terms, events, and the parts of the controller."""
+        """All objects that have numbers: terms, events, and the parts of the controller."""
 
     @property
     def start(self) -> Start:
@@ -51,7 +51,7 @@ class SceneLike(Protocol):
 
     @property
     def source(self) -> Mapping[str, Any]:
-        """The file that it was read from: its name, its text, and what replaced keys of it; empty where there is none."""
+        """The file of the scene: its name, its text, and the overrides of its keys; empty without a file."""
 
     @property
     def ensemble_settings(self) -> EnsembleSettings | None:
@@ -59,10 +59,10 @@ class SceneLike(Protocol):
 
     @property
     def ensemble_is_checked(self) -> bool:
-        """Whether the ensemble of `ensemble_settings` was built before, and so was found to be sound."""
+        """Whether the ensemble of `ensemble_settings` was built before, and is therefore known to be valid."""
 
     def note_checked_ensemble(self) -> None:
-        """Remember that the ensemble of `ensemble_settings` is sound."""
+        """Record that the ensemble of `ensemble_settings` is valid."""
 
     def parameters(self) -> dict[str, np.ndarray]:
         """Return every number that may vary from member to member."""

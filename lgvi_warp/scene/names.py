@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Names of the numbers of a scene, wherever a user writes one.
+"""Names by which a user refers to the numbers of a scene.
 
-A name is a key of the scene file ("run.step"), or that of a number in `scene.parameters()` ("heading_pid.kp"). Either may have
-an index. A part may be named by its place in its list: "controller.sensors[0].noise".
+A name is a key of the scene file ("run.step"), or a name in `scene.parameters()` ("heading_pid.kp"). Either may have an
+index. A part may be named by its place in its list: "controller.sensors[0].noise".
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ PLACE = re.compile(rf"({'|'.join(map(re.escape, LISTS))})\[(\d+)\](?=\.)")
 
 
 def file_keys() -> list[str]:
-    """Keys of a scene file that name no number of every scene, for messages."""
+    """Keys of a scene file that are not names of numbers in every scene, for messages."""
     kinds: dict[str, Any] = {"environment": Environment, "ensemble": EnsembleSettings, "run": RunSettings}
     return [f"{section}.{item.name}" for section, kind in kinds.items() for item in fields(kind)]
 
 
 def by_key(scene: Any, name: str) -> str:
-    """The name of a number with the key of its part, where the part is named by its place."""
+    """The name of a number, with the part's key in place of the part's index in its list."""
 
     def key(match: re.Match[str]) -> str:
         owner, _, section = match[1].rpartition(".")
@@ -45,7 +45,7 @@ def by_key(scene: Any, name: str) -> str:
 
 
 def all_by_key(argument: str, scene: Any, values: Mapping[str, Value]) -> dict[str, Value]:
-    """The values by names as in `by_key`. Raises SceneError if two names are of the same number."""
+    """The values with names as in `by_key`. Raises SceneError if two names refer to the same number."""
     keyed: dict[str, Value] = {}
     for name, value in values.items():
         key = by_key(scene, name)
@@ -61,7 +61,7 @@ def numbers_of(scene: Any) -> dict[str, np.ndarray]:
 
 
 def single_number(scene: Any, name: str, argument: str = "vary") -> tuple[Target, float]:
-    """Resolve the name of a single number to its target and value; argument: what names it, for faults."""
+    """Resolve the name of a single number to its target and value; argument: name of the argument in error messages."""
     (target,) = variations.targets(by_key(scene, name))
     known, faults = numbers_of(scene), Faults(f"{argument}.")
     if variations.known_target(faults, name, "...", target, known) and (ndim := target.of(known[target.name]).ndim):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A scene with other numbers, by the names by which they vary."""
+"""A scene with other numbers, which are named as for variations."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ SETTINGS = ("controller.period", "run.step", "run.duration")
 
 
 def with_numbers(scene: SceneT, numbers: Mapping[str, Any], keys: Sequence[str] = ()) -> SceneT:
-    """Return a scene with other numbers, by names as `Scene.with_numbers` has them.
+    """Return a scene with other numbers, by the names of `Scene.with_numbers`.
 
-    keys: Names that messages suggest beside those of numbers.
+    keys: Names that messages suggest in addition to those of numbers.
     """
     base, faults, taken = scene.parameters(), Faults(), []
     changes: dict[str, dict[str, Any]] = {}
@@ -64,12 +64,12 @@ def with_numbers(scene: SceneT, numbers: Mapping[str, Any], keys: Sequence[str] 
 
 
 def _of_start(scene: Any, name: str) -> Any:
-    """A number of the start; None where the start is given by others."""
+    """A number of the start; None if the start is given by other quantities."""
     return scene.start.geodetic if name == "geodetic" else scene.start.given().get(name)
 
 
 def _changed(scene: SceneT, changes: Mapping[str, Mapping[str, Any]]) -> SceneT:
-    """The scene with other values of fields, by the key of the part that has them."""
+    """The scene with other values of fields, given as {key of a part: {field: value}}."""
     if not changes:
         return scene
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Odd values of many members: counted, and described by the first member that has one."""
+"""Odd values of many members: their number, and a description of the first."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Odd:
 
 @dataclass(frozen=True)
 class Oddities:
-    """Odd values by quantity; `a | b` joins those of members `a` with those of members `b` after them."""
+    """Odd values by quantity; `a | b` joins the odd values of some members with those of later members."""
 
     by_name: Mapping[str, Odd]
 
@@ -33,7 +33,7 @@ class Oddities:
         return Oddities(joined)
 
     def messages(self, members: int, most: int | None = None) -> tuple[str, ...]:
-        """Return one sentence for each odd quantity; `most` members were looked at, None for all."""
+        """Return one sentence for each odd quantity; `most`: number of members checked, None for all."""
         return tuple(f"{key}: {odd.text}{_whose(odd, members, most)}" for key, odd in self.by_name.items())
 
 
@@ -53,7 +53,7 @@ OddityCheck = tuple[str, np.ndarray, Callable[[int], str]]
 def gathered(checked: Iterable[OddityCheck], first: int, stop: int) -> Oddities:
     """Count the odd values of the members first to stop - 1.
 
-    Where several checks bear one name, the first that finds an odd member counts.
+    If several checks have the same name, the first one that finds an odd member counts.
     """
     odd_by_name: dict[str, Odd] = {}
     for key, odd, text in checked:

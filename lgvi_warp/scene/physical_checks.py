@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whether the numbers of an ensemble's members are physical, as far as they vary."""
+"""Checks that the varied numbers of an ensemble's members are physical."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from lgvi_warp.scene.slices import over_members
 
 @dataclass
 class Unphysical:
-    """Unphysical values of one quantity: the first such member, its value, and how many; shared: one value for all."""
+    """Unphysical values of one quantity: the first member, its value, and the count. shared: One value for all members."""
 
     first: int
     value: Any
@@ -37,7 +37,7 @@ Check = Callable[[Numbers, float], np.ndarray]
 
 
 def _odd_entry(value: Any) -> tuple[str, Any]:
-    """Return the place of the first entry that is not finite, as in "[1,2]", and the entry; or "" and the value itself."""
+    """Return the index of the first entry that is not finite, such as "[1,2]", and the entry; else "" and the value."""
     numbers = np.asarray(value)
     if not numbers.ndim or np.isfinite(numbers).all():
         return "", value
@@ -47,9 +47,9 @@ def _odd_entry(value: Any) -> tuple[str, Any]:
 
 @dataclass(frozen=True)
 class PhysicalChecks:
-    """The checks of an ensemble, which raise SceneError where a member is unphysical, and name the first such member.
+    """The checks of an ensemble, which raise SceneError if a member is unphysical and name the first such member.
 
-    Only parameters that vary are looked at; a fault of those that are drawn says so.
+    Only varied parameters are checked. For drawn parameters, the message says that they are drawn.
     """
 
     scene: SceneLike
@@ -58,7 +58,7 @@ class PhysicalChecks:
     members: int
 
     def of_members(self, parameters: Callable[[int, int], Mapping[str, np.ndarray]], count: int) -> None:
-        """Look at the first members by the parameters from first to stop - 1, at so few at a time that memory stays small."""
+        """Check the first `count` members in groups that need little memory; parameters(first, stop) gives their numbers."""
 
         def look(first: int, stop: int) -> dict[str, Unphysical]:
             with np.errstate(over="ignore", invalid="ignore"):
@@ -74,7 +74,7 @@ class PhysicalChecks:
         self._refuse(findings, count)
 
     def of_block(self, first: int, stop: int, parameters: Mapping[str, np.ndarray]) -> None:
-        """Look at the members from first to stop - 1."""
+        """Check the members first to stop - 1."""
         self._refuse(self._look_at(first, stop, parameters), stop - first)
 
     def _refuse(self, findings: Mapping[str, Unphysical], looked_at: int) -> None:
@@ -114,13 +114,13 @@ class PhysicalChecks:
 
 
 def _vehicle_checks(p: Numbers, varied: AbstractSet[str], tolerance: float) -> dict[str, np.ndarray]:
-    """Return masks (n,) by name: which members' varied numbers of vehicle and environment are unphysical."""
+    """Return {name: mask (n,)} of the members with unphysical varied numbers of vehicle and environment."""
     return {key: check(p, tolerance) for key, check in _checks_of(frozenset(p), frozenset(varied))}
 
 
 @functools.lru_cache(maxsize=64)
 def _checks_of(names: frozenset[str], varied: frozenset[str]) -> tuple[tuple[str, Check], ...]:
-    """The checks of numbers of vehicle and environment that vary, by name. Kept, since a call of few members asks again."""
+    """The checks of varied numbers of vehicle and environment, by name. Cached, since calls with few members repeat."""
     vectors, sizes = ("center_of_buoyancy", "center_of_gravity"), ("buoyancy", "weight")
     checks: dict[str, Check] = {}
     if "vehicle.mass" in names:
@@ -171,13 +171,13 @@ def _no_density(p: Numbers, tolerance: float) -> np.ndarray:
 
 
 def _positive(diagonals: np.ndarray) -> np.ndarray:
-    """Return which diagonals (n, d) have an inverse."""
+    """Mask of the diagonals (n, d) whose entries are positive."""
     # By columns: rows of few numbers take many times as long.
     return functools.reduce(np.logical_and, [(x >= vehicles.LEAST) & np.isfinite(x) for x in diagonals.T])
 
 
 def _positive_definite(matrices: np.ndarray) -> np.ndarray:
-    """Return which symmetric matrices (n, d, d) are positive definite, by elimination; False where not finite."""
+    """Mask of the symmetric matrices (n, d, d) that are positive definite, by elimination; False if not finite."""
     d, diagonals = matrices.shape[-1], np.einsum("nii->ni", matrices)
     if np.count_nonzero(matrices) == np.count_nonzero(diagonals):  # diagonal matrices
         return _positive(diagonals)

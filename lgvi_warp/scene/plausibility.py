@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Values that are possible yet odd, most often by a wrong unit: messages name them, nothing is refused.
+"""Checks for values that are possible but implausible, most often due to a wrong unit; messages name them.
 
-Every check looks at the numbers of many members at once. Members with odd values are counted, and the first is named.
+Nothing is refused. Every check reads the numbers of many members at once, counts odd values and names the first member.
 """
 
 from __future__ import annotations
@@ -77,12 +77,12 @@ UNASKED = "no law asks for a force or a moment that it makes, so it stays at res
 
 
 def _text(template: str, *numbers: np.ndarray) -> Callable[[int], str]:
-    """The text of each member, from its numbers."""
+    """A function that returns the text for a member, from its numbers."""
     return lambda i: template.format(*(values[i] for values in numbers))
 
 
 def net_weight(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
-    """Look for a net weight that hardly any vehicle has; one that floats may be as light as it likes."""
+    """Look for an implausible net weight; a vehicle that loses buoyancy above the surface may have any positive buoyancy."""
     weight, buoyancy = np.broadcast_arrays(vehicles.weight(p), p["vehicle.buoyancy"])
     net = weight - buoyancy
 
@@ -143,9 +143,9 @@ def depths(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
 def inertia(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
     """Look for inertia that a body of this mass and length cannot have.
 
-    The length is that of the stations of a hull. Within a length L along x and a breadth D, the variance of a
-    coordinate is at most a quarter of its range squared (Popoviciu 1935), so that the rigid body's inertia is at most
-    m (L^2 + D^2)/4. Added inertia is that of strips: at most the added mass times the largest distance squared.
+    The length is that of the hull's stations. Within a length L along x and a breadth D, the variance of a coordinate is
+    at most a quarter of its range squared (Popoviciu 1935). The rigid body's inertia is therefore at most m (L^2 + D^2)/4.
+    Added inertia is that of strips: at most the added mass times the largest distance squared.
     """
     for term in scene.terms:
         if isinstance(term, StripTerm):
@@ -156,7 +156,7 @@ def inertia(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
 
 
 def _inertia(p: Numbers, rigid: np.ndarray, arm: np.ndarray, length: np.ndarray) -> Iterator[OddityCheck]:
-    """Compare the largest moment of inertia about a body axis with its limit; the largest principal one is no less."""
+    """Compare the largest moment of inertia about a body axis with its limit; the largest principal moment is not less."""
     both = "vehicle.inertia" in p
     name = "vehicle.inertia" if both else "vehicle.rigid_body_mass_matrix"
     added = p["vehicle.added_mass" if both else "vehicle.added_mass_matrix"]
@@ -175,7 +175,7 @@ def _diagonal(matrices: np.ndarray) -> np.ndarray:
 
 
 def actuators(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
-    """Look for components that actuators cannot make, wanted quantities that no law reads, and idle actuators."""
+    """Look for components that actuators cannot produce, wanted quantities that no law reads, and idle actuators."""
     controller = scene.controller
     if controller is None:
         return
@@ -190,7 +190,7 @@ def actuators(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
 
 
 def hulls(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
-    """Look for two terms that brake the same part of a hull: `hull_loads` has the drag of `cross_flow`."""
+    """Look for two terms with drag of the same part of a hull: `hull_loads` includes the drag of `cross_flow`."""
     terms = [term for term in scene.terms if isinstance(term, StripTerm)]
     for first, second in itertools.combinations(terms, 2):
         both = np.array(True)
@@ -202,7 +202,7 @@ def hulls(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
 
 
 def driving(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
-    """Look for products of velocities that push a vehicle along its own motion: printed drag and damping are below 0."""
+    """Look for products of velocities that accelerate a vehicle; published drag and damping coefficients are negative."""
     for term in scene.terms:
         if isinstance(term, QuadraticForm):
             for along, places in drives(term.forms).items():
@@ -211,14 +211,14 @@ def driving(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
 
 
 def remarks(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
-    """Pass on what terms say of their own numbers."""
+    """Collect the remarks of terms on their own numbers."""
     for term in (*scene.terms, *scene.events):
         for text in term.remarks:
             yield term.key, np.array([True]), lambda i, text=text: text  # type: ignore[misc]
 
 
 def waypoints(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
-    """Look for waypoints so far from the origin of a map that its lengths are not those of the Earth."""
+    """Look for waypoints so far from the origin that the flat map distorts distances."""
     if scene.environment.origin is not None:
         for term in (term for term in scene.parts if term.type == "waypoints"):
             points = p[f"{term.key}.points"]
@@ -226,7 +226,7 @@ def waypoints(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
 
 
 def _far_away(key: str, distance: np.ndarray) -> OddityCheck:
-    """Look for places that are far from the origin of the map, at distances (n,) [m]."""
+    """Check distances (n,) [m] from the origin of the map for large values."""
     return key, distance > FAR_FROM_ORIGIN, _text(FAR_AWAY, distance / 1e3, 100.0 * too_long(distance))
 
 
@@ -244,7 +244,7 @@ def of_numbers(
     stop: int,
     once: Callable[[Any, Any, Callable[[Any], Any]], Any] = lambda key, numbers, compute: compute(numbers),
 ) -> Oddities:
-    """Return the odd parameters of some members; `once` may remember computations of what all members share."""
+    """Return the odd parameters of some members; `once` may cache computations of numbers that all members share."""
     with np.errstate(all="ignore"):
         checked = [once(check, p, functools.partial(_checked, check, scene)) for check in OF_NUMBERS]
         return gathered(itertools.chain(*checked), first, stop)
@@ -273,7 +273,7 @@ def of_ensemble(ensemble: Ensemble) -> Oddities:
 
 
 def of_start(scene: SceneLike, members: Members, first: int = 0) -> Oddities:
-    """Return the odd starts of some members, and the odd velocities of water that user-defined terms give there."""
+    """Return the odd starts of some members, and odd water velocities of user-defined terms at these starts."""
     with np.errstate(all="ignore"):
         return gathered(_of_start(scene, members), first, first + members.count)
 
@@ -320,7 +320,7 @@ def beyond(scene: SceneLike, members: Members) -> Iterator[OddityCheck]:
 
 
 def own_flows(scene: SceneLike) -> list[Term]:
-    """The user-defined terms that move the water. Waves are left out, too: in them water may be faster than in any current."""
+    """The user-defined terms that move the water, without waves, in which water may be faster than in any current."""
     known = [term for term in scene.terms if term.type not in CURRENTS and not isinstance(term, WaveTerm)]
     return [term for term in known if type(term).water is not Term.water]
 
@@ -343,9 +343,9 @@ def floats(scene: SceneLike) -> bool:
 
 
 def on_the_way(samples: Mapping[str, np.ndarray]) -> Oddities:
-    """Oddities that arose in members that began well, from samples already in memory.
+    """Oddities that arose during the run in members with a plausible start, from samples in memory.
 
-    samples: "velocity", (k, n, 3) [m/s], of which the first is the start.
+    samples: "velocity", (k, n, 3) [m/s]; the first sample is the start.
     """
     limit = LIMITS["speed"].value
     with np.errstate(all="ignore"):
@@ -357,7 +357,7 @@ def on_the_way(samples: Mapping[str, np.ndarray]) -> Oddities:
 
 
 def _later(samples: np.ndarray | None, limit: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return for each member (n,) whether its speed passed the limit only after the start, and its largest speed then."""
+    """Return for each member (n,) whether its speed exceeded the limit only after the start, and its largest speed."""
     if not isinstance(samples, np.ndarray) or len(samples) < 2:
         return np.zeros(0, dtype=bool), np.zeros(0)
     times = range(1, len(samples)) if samples.size <= MOST_SAMPLES else range(len(samples) - 1, len(samples))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A scene: one vehicle, its environment, the terms that act and the state it starts from."""
+"""A scene: one vehicle, its environment, the terms that act on it, and its initial state."""
 
 from __future__ import annotations
 
@@ -46,30 +46,30 @@ KINDS = {"vehicle": Vehicle, "environment": Environment, "start": Start, "run": 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Scene(Summarized):
-    """One vehicle, its environment, the terms that act on it and the state it starts from.
+    """One vehicle, its environment, the terms that act on it, and its initial state.
 
     Weight, buoyancy and restoring moment follow from the vehicle; they are not listed as terms.
 
     Args:
         vehicle: The body, as lw.Vehicle(...).
         environment: Gravity and water, as lw.Environment(...); by default the standard values.
-        terms: What else acts, such as lw.terms.Drag(...), or tables as in a scene file.
+        terms: Further forces, such as lw.terms.Drag(...), or tables as in a scene file.
         start: The state at t = 0, as lw.Start(...); by default at rest at the origin.
-        controller: What steers the vehicle, as lw.Controller(...) or a table as in a scene file; None, the default, for none.
+        controller: The controller, as lw.Controller(...) or a table as in a scene file; None, the default, for none.
         run: Settings of the run, the section [run] of a scene file.
-        ensemble_settings: What varies, the section [ensemble] of a scene file; None if nothing does.
-        events: What stops a member, such as lw.events.Surface(), or tables as in a scene file.
+        ensemble_settings: Variations between members, the section [ensemble] of a scene file; None if nothing varies.
+        events: Conditions that stop a member, such as lw.events.Surface(), or tables as in a scene file.
 
     Methods:
-        load: Read a scene file, or a shipped scene ("example:paper").
+        load: Read a scene file, or a scene that comes with the package ("example:paper").
         named: Scene of a vehicle that comes with the package.
-        from_dict: Scene of tables in the form of a scene file.
+        from_dict: Scene from tables in the form of a scene file.
         to_dict: Tables in the form of a scene file.
-        parameters: Every number that may vary from member to member.
+        parameters: Every number that may vary between members.
         with_numbers: The scene with other numbers.
 
     Raises:
-        SceneError: If anything is wrong; the message lists every fault.
+        SceneError: If an argument is invalid; the message lists every fault.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -121,7 +121,7 @@ class Scene(Summarized):
         faults.raise_if_any()
 
     def summary_rows(self) -> tuple[str, summaries.Rows]:
-        """The numbers of vehicle and start, and a row for each other section."""
+        """Rows of the summary: numbers of vehicle and start, and a row for each other section."""
         water, run, settings = self.environment, self.run.to_dict(), self.ensemble_settings
         numbers, start = self.vehicle.parameters().items(), self.start.given().items()
         rows = [("vehicle", self.vehicle.title)] if self.vehicle.title else []
@@ -145,7 +145,7 @@ class Scene(Summarized):
         return "Scene", rows
 
     def _locate(self, faults: Faults) -> None:
-        """Convert places on the Earth, of the start and of waypoints, to positions from the origin."""
+        """Convert geodetic coordinates of the start and of waypoints to positions relative to the origin."""
         with faults.including():
             object.__setattr__(self, "start", self.start.located(self.environment))
         if self.controller is not None and not faults:
@@ -153,7 +153,7 @@ class Scene(Summarized):
                 object.__setattr__(self, "controller", self.controller.located(self.environment.plane))
 
     def _connect(self) -> None:
-        """Let terms take the commands of the controller, if there is one, and know their vehicle."""
+        """Connect the terms with the commands of the controller, if there is one, and with their vehicle."""
         bus = None
         if self.controller is not None:
             object.__setattr__(self, "controller", self.controller.wired(self.terms, self._nominal(), self.events))
@@ -177,17 +177,17 @@ class Scene(Summarized):
 
     @property
     def parts(self) -> tuple[Any, ...]:
-        """Everything that has numbers of its own: terms, events, and the parts of the controller."""
+        """All objects that have numbers: terms, events, and the parts of the controller."""
         parts = () if self.controller is None else (self.controller.delay_part, *self.controller.parts)
         return (*self.terms, *self.events, *parts)
 
     def _with_own_events(self) -> tuple[Any, ...]:
-        """The events, with those that terms bring along in place of former ones."""
+        """The events, with the present events of terms in place of earlier ones."""
         own = tuple(event for term in self.terms for event in term.own_events)
         return (*(event for event in self.events if not isinstance(event, events.Outside)), *own)
 
     def _check_names(self, faults: Faults) -> None:
-        """Require different names of all terms and events, on every file system."""
+        """Require different names of all terms and events, also on file systems that ignore case."""
         parts = () if self.controller is None else self.controller.parts
         keys = [term.key for term in (*self.terms, *self.events, *parts)]
         counts = Counter(keys)
@@ -210,11 +210,11 @@ class Scene(Summarized):
             faults.add("terms and events", second, problem, f'give each a name of its own: name = "{second}_2"')
 
     def note_checked_ensemble(self) -> None:
-        """Remember that the ensemble of `ensemble_settings` is sound: it need not be checked again."""
+        """Record that the ensemble of `ensemble_settings` is valid and need not be checked again."""
         object.__setattr__(self, "ensemble_is_checked", True)
 
     def parameters(self) -> dict[str, np.ndarray]:
-        """Return every number that may vary from member to member, with the value that this scene has.
+        """Return every number that may vary between members, with its value in this scene.
 
         Returns:
             Values by name: "vehicle.mass", "environment.gravity", "drag.quadratic" (a term's name and its field), ...
@@ -229,10 +229,10 @@ class Scene(Summarized):
         """Return the scene with other numbers.
 
         Args:
-            numbers: Values by name: those of `parameters()`, single entries ("drag.quadratic[0]"), parts by their place
-                ("controller.sensors[0].noise"), "start.position" and what else a start has, "controller.period", "run.step"
-                and "run.duration". A held command takes the place of another, a schedule that of a held one, an attitude that
-                of another form.
+            numbers: Values by name. Names are those of `parameters()`, of single entries ("drag.quadratic[0]"), of parts by
+                their place ("controller.sensors[0].noise"), "start.position" and other fields of the start,
+                "controller.period", "run.step" and "run.duration". A new command or schedule replaces a constant command,
+                and a new attitude replaces an attitude in any form.
 
         Returns:
             A new scene.
@@ -250,7 +250,7 @@ class Scene(Summarized):
         """Read a scene from a scene file (TOML).
 
         Args:
-            path: Path of the file; "example:NAME" for one that comes with the package (`lgvi-warp example` lists them).
+            path: Path of the file, or "example:NAME" for a file that comes with the package (`lgvi-warp example` lists them).
             overrides: Values that replace those of the file, by key ("run.step") or by name as in `with_numbers`
                 ("heading_pid.kp", "current.velocity[0]"); by default none.
 
@@ -258,7 +258,7 @@ class Scene(Summarized):
             The scene.
 
         Raises:
-            SceneError: If the file cannot be read or its content is wrong; the message lists every fault.
+            SceneError: If the file cannot be read or its content is invalid; the message lists every fault.
         """
         from lgvi_warp.scene.examples import located
 
@@ -271,16 +271,16 @@ class Scene(Summarized):
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> Scene:
-        """Build a scene from tables in the form of a scene file, such as the importers return.
+        """Build a scene from tables in the form of a scene file, such as those that the importers return.
 
         Args:
-            content: Tables by section name: "vehicle", "environment", "terms", ...; objects of "start" and "run" as well.
+            content: Tables by section name: "vehicle", "environment", "terms", ...; "start" and "run" may also be objects.
 
         Returns:
             The scene.
 
         Raises:
-            SceneError: If anything is wrong; the message lists every fault.
+            SceneError: If a table is invalid; the message lists every fault.
         """
         return from_dict(content)
 
@@ -292,13 +292,13 @@ class Scene(Summarized):
             name: Name of the vehicle, such as "remus_100".
             **sections: Sections as in a scene file. Keys of vehicle={...} and environment={...} replace single values.
                 An entry of terms=[...] replaces the vehicle's term of the same name or type, or is added to its terms.
-                start may be lw.Start(...) as well, controller lw.Controller(...).
+                start may also be lw.Start(...), and controller lw.Controller(...).
 
         Returns:
-            The scene, with the vehicle's own terms and the water that its numbers were found in.
+            The scene, with the vehicle's own terms and the water in which its numbers were determined.
 
         Raises:
-            SceneError: If anything is wrong; the message lists every fault.
+            SceneError: If a name or a section is invalid; the message lists every fault.
         """
         return from_dict({**sections, "vehicle": {**sections.get("vehicle", {}), "name": name}})
 
@@ -315,7 +315,7 @@ class Scene(Summarized):
 
     @functools.cached_property
     def _tables(self) -> dict[str, Any]:
-        """The tables of `to_dict`, made once: the numbers of a scene never change."""
+        """The tables of `to_dict`, cached because the numbers of a scene never change."""
         content: dict[str, Any] = {
             "vehicle": self.vehicle.to_dict(),
             "environment": self.environment.to_dict(),
@@ -332,7 +332,7 @@ class Scene(Summarized):
 
 
 def _copied(content: Any) -> Any:
-    """Tables and lists of plain values, copied down to the values."""
+    """A deep copy of tables and lists of plain values."""
     if type(content) is dict:
         return {key: _copied(value) for key, value in content.items()}
     if type(content) is not list:
@@ -410,7 +410,7 @@ def from_dict(content: Mapping[str, Any], numbers: Mapping[str, Any] | None = No
 
 
 def _check_ensemble(settings: EnsembleSettings, scene: Scene | None, parameters: Sequence[str]) -> None:
-    """Check that what varies fits the scene, before anything runs; if the scene has faults, check names alone."""
+    """Check that the variations fit the scene, before anything runs; if the scene has faults, check only names."""
     if scene is None:
         check_names(settings.vary, parameters)
     else:
@@ -421,7 +421,7 @@ def _check_ensemble(settings: EnsembleSettings, scene: Scene | None, parameters:
 
 
 def _build(faults: Faults, name: str, kind: Callable[..., Any], table: Mapping[str, Any]) -> Any:
-    """Construct a section's object from its table; on failure note the faults and return None."""
+    """Construct a section's object from its table; on failure add the faults and return None."""
     signature = list(inspect.signature(kind).parameters)
     faults.keys(name, table, signature)
     known = {key: value for key, value in table.items() if key in signature}

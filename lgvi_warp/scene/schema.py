@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The scene file as a JSON schema, made of the tables that the loader uses, for editors and for other programs."""
+"""JSON schema of the scene file, built from the loader's own tables, for editors and other programs."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ WORDS = {"float": "number", "int": "integer", "str": "string", "bool": "boolean"
 
 
 def schema() -> Schema:
-    """Describe scene files."""
+    """The JSON schema of scene files."""
     own_terms = {word: kind for word, kind in terms.TYPES.items() if word not in {term.type for term in terms.IMPLIED}}
     vary = {word: _table(kind) for word, kind in DISTRIBUTIONS.items() if word != UserDistribution.kind}
     vary |= {word: {"type": "object"} for word in (*SCIPY, ScipyDistribution.kind)}
@@ -71,13 +71,13 @@ def schema() -> Schema:
 
 
 def _alone(kinds: Mapping[str, Schema]) -> Schema:
-    """A table with one key, the kind."""
+    """A table with a single key, the kind."""
     return {"type": "object", "properties": dict(kinds), "additionalProperties": False, "minProperties": 1,
             "maxProperties": 1}  # fmt: skip
 
 
 def _list(kinds: Mapping[str, Any], default: str | None = None) -> Schema:
-    """A list of tables, each with its type; default: the type of a table without one."""
+    """A list of tables, each with its type; default: The type of a table that names none."""
     able = {
         word: kind for word, kind in kinds.items() if not any("Callable" in str(item.type) for item in _fields(kind))
     }
@@ -98,7 +98,7 @@ def _fields(kind: Any) -> list[dataclasses.Field[Any]]:
 
 
 def _table(kind: Any, known: Mapping[str, Schema] | None = None, required: Iterable[str] = ()) -> Schema:
-    """A table with the fields of a class, some of which are known."""
+    """A table with the fields of a class; `known` gives the schemas of some fields."""
     texts, known = meanings(kind), known or {}
     content: dict[str, Schema] = {name: dict(item) for name, item in known.items()}
     for item in _fields(kind):
@@ -127,7 +127,7 @@ def _value(kind: Any, item: dataclasses.Field[Any]) -> Schema:
 
 
 def _in_other_forms(kind: Any, name: str, value: Schema) -> Schema:
-    """A number of a part that may be a word, or a table over what is measured."""
+    """A number of a part, which may also be a word or a gain table over a measured quantity."""
     forms: list[Schema] = []
     if issubclass(kind, Part) and name in kind.words_for:
         forms.append({"const": kind.words_for[name]})
@@ -143,7 +143,7 @@ def _in_other_forms(kind: Any, name: str, value: Schema) -> Schema:
 
 
 def _numbers(shape: tuple[Any, ...], number: Schema | None = None) -> Schema:
-    """Nested lists of this shape; where a size is a word, a list or one number for all."""
+    """Nested lists of this shape; if a size is a word, a list or one number for all entries."""
     number = number or {"type": "number"}
     if not shape:
         return number

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Settings that a scene file holds: its sections [run] and [ensemble]."""
+"""Settings of a scene file: its sections [run] and [ensemble]."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ NO_DEVICE = "is not a device of a run: runs are on CPU cores", 'leave it out, or
 
 
 def check_device(device: Any) -> None:
-    """Refuse a place where no run can be."""
+    """Refuse a device that cannot run."""
     faults = Faults()
     if not among(device, DEVICES):
         faults.add("device", device, *NO_DEVICE)
@@ -39,7 +39,7 @@ def check_device(device: Any) -> None:
 
 
 def read_keep(key: str, keep: Any, members: int | None = None) -> str | list[int]:
-    """Read which members' samples are to be kept: one of KEEP, or rising indices."""
+    """Read the choice of members whose samples are kept: one of KEEP, or rising indices."""
     if not isinstance(keep, str):
         return sorted(set(members_of(key, keep, members).tolist()))
     faults = Faults()
@@ -53,11 +53,11 @@ class RunSettings:
     """The section [run] of a scene file.
 
     Args:
-        method: Name of the integration method; None (default) lets a run choose it by what acts in the scene.
-        step: Length of a step [s]; None leaves it to the call of solve.
-        duration: Simulated time [s]; None leaves it to the call of solve.
-        save_every: Time between samples [s]; None leaves it to the call of solve.
-        save_fields: Names of the samples, as `fields` of SaveAt; None (default) for those of the motion.
+        method: Name of the integration method; with None (default), a run chooses it by the terms of the scene.
+        step: Length of a step [s]; None if the call of solve gives it.
+        duration: Simulated time [s]; None if the call of solve gives it.
+        save_every: Time between samples [s]; None if the call of solve gives it.
+        save_fields: Names of the samples, as `fields` of SaveAt; None (default) for the motion.
         dtype: Number type of the computation; by default "float64".
         solver: As in Method.
         iterations: As in Method.
@@ -66,13 +66,13 @@ class RunSettings:
         atol: As in Method.
         checks: As in solve; by default "safe".
         on_failure: As in solve; by default "freeze".
-        device: As in solve; by default "cpu", the only one.
+        device: As in solve; by default "cpu", the only device.
         keep: Members whose samples are kept: "all" (default), "none", "failed", or a list of indices.
         statistics: Tables as in [[run.statistics]], or Statistic objects; by default none.
         until: A table as in [run.until], or an Until; None for a fixed number of members (default).
 
     Raises:
-        SceneError: If anything is wrong; the message lists every fault.
+        SceneError: If a setting is invalid; the message lists every fault.
     """
 
     method: str | None = text("is not a text", 'give the name of a method, such as "psi_s"', None)
@@ -122,7 +122,7 @@ class RunSettings:
         faults.raise_if_any()
 
     def method_of(self, name: str | None = None) -> Method:
-        """The method of this section, "psi_s" if it has none, with the options here; of another name, with its defaults."""
+        """The method of this section with its options, by default "psi_s"; or the method `name` with default options."""
         set_here = Method.name if self.method is None else self.method
         if name is not None and not among(name, (set_here,)):
             return Method(name)
@@ -130,7 +130,7 @@ class RunSettings:
 
     @property
     def method_options(self) -> dict[str, Any]:
-        """The options of the method that this section has, by name."""
+        """The method options that this section gives, by name."""
         options = {key: getattr(self, key) for key in ("solver", "iterations", "tolerance", "rtol", "atol")}
         return {key: value for key, value in options.items() if value is not None}
 
@@ -158,12 +158,12 @@ class EnsembleSettings:
     Args:
         members: Number of members, from 1 to 2**31; None for as many as the sampling has, or 1 (default).
         seed: Whole number from 0; by default 0.
-        vary: Distributions by name of what varies, as in Ensemble; by default nothing varies.
-        sampling: How points are drawn: a name, an object such as lw.designs.Grid(...), or a table; by default "random".
+        vary: {name of a number: distribution}, as in Ensemble; by default nothing varies.
+        sampling: Design of the points: a name, an object such as lw.designs.Grid(...), or a table; by default "random".
         indices: Indices of the members to run; None for all (default).
 
     Raises:
-        SceneError: If anything is wrong; the message lists every fault.
+        SceneError: If a setting is invalid; the message lists every fault.
     """
 
     members: int | None = whole(1, "is not a whole number from 1", "give 1 or more", None)
@@ -200,7 +200,7 @@ class EnsembleSettings:
 def section(
     members: int | None, seed: int, vary: Mapping[str, Any], sampling: Sampling, indices: Any
 ) -> dict[str, Any]:
-    """Write the section [ensemble] of a scene file from settings that were checked."""
+    """Return the section [ensemble] of a scene file for checked settings."""
     content: dict[str, Any] = {} if members is None else {"members": int(members)}
     content["seed"] = int(seed)
     if vary:

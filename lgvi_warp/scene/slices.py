@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""All members of an ensemble, some at a time so that memory stays small, on all cores."""
+"""Loop over all members of an ensemble in groups that need little memory, on all cores."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Finding = TypeVar("Finding")
 
 
 def over_members(look: Callable[[int, int], Finding], members: int) -> list[Finding]:
-    """Apply a function to all members, some at a time so that memory stays small, on all cores."""
+    """Apply a function to all members in groups that need little memory, on all cores."""
     firsts = range(0, members, AT_ONCE)
     if len(firsts) < 2:
         return [look(0, members)] if members else []

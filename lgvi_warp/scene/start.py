@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The environment of a scene and the state that its members start from."""
+"""The environment of a scene, and the initial state of its members."""
 
 from __future__ import annotations
 
@@ -30,25 +30,26 @@ NAMES = (*PLACES, *ATTITUDES, *VELOCITIES, "angular_velocity")
 
 @dataclass(frozen=True)
 class Environment:
-    """Gravity and density of the water around the vehicle, and where and when on the Earth it is.
+    """Gravity, density of the water, and the location and date of the scene on the Earth.
 
     Args:
         gravity: Acceleration of free fall [m/s2], >= 0; by default 9.80665 (standard gravity).
         water_density: Density of the water [kg/m3], > 0; by default 1025 (sea water).
-        origin: Latitude and longitude (2,) [deg, WGS 84] of the origin of the inertial axes, which point to its north, its
-            east and down; by default None, not known. Longitudes may be -180 to 180 or 0 to 360.
-        start: Date and time at t = 0, as "2026-06-01T00:00:00Z"; without a zone it is UTC. By default None, not known.
+        origin: Latitude and longitude (2,) [deg, WGS 84] of the origin of the inertial axes, which point north, east and
+            down there; by default None, for unknown. Longitudes may be -180 to 180 or 0 to 360.
+        start: Date and time at t = 0, such as "2026-06-01T00:00:00Z", in UTC unless it names a time zone. By default None,
+            for unknown.
 
     Attributes:
-        start_time: Date and time at t = 0 in UTC; None where it is not known.
+        start_time: Date and time at t = 0 in UTC; None if unknown.
 
     Methods:
-        positions: Convert places on the Earth to positions.
-        geodetic: Convert positions to places on the Earth.
+        positions: Convert geodetic coordinates to positions.
+        geodetic: Convert positions to geodetic coordinates.
         to_dict: The section [environment] of a scene file.
 
     Raises:
-        SceneError: If a number is negative or not finite, a latitude beyond 90 degrees; the message lists every fault.
+        SceneError: If a number is negative or not finite, or a latitude is beyond 90 degrees; the message lists every fault.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -82,7 +83,7 @@ class Environment:
 
     @property
     def start_time(self) -> np.datetime64 | None:
-        """Date and time at t = 0 in UTC, to the microsecond; None where it is not known."""
+        """Date and time at t = 0 in UTC, to the microsecond; None if unknown."""
         return None if self.start is None else _moment(self.start)
 
     @property
@@ -96,10 +97,10 @@ class Environment:
         return LocalPlane(*self.origin)
 
     def positions(self, geodetic: Any) -> np.ndarray:
-        """Convert places on the Earth to positions.
+        """Convert geodetic coordinates to positions in inertial axes.
 
         Args:
-            geodetic: Latitude, longitude [deg] and depth [m] of places, (..., 3).
+            geodetic: Latitude, longitude [deg] and depth [m] of points, (..., 3).
 
         Returns:
             Positions (..., 3) [m], inertial axes (north, east, down).
@@ -112,14 +113,14 @@ class Environment:
         return positions_of(self, "geodetic", _in_threes("geodetic", geodetic, remedy))
 
     def geodetic(self, position: Any) -> np.ndarray:
-        """Convert positions to places on the Earth.
+        """Convert positions in inertial axes to geodetic coordinates.
 
         Args:
             position: Positions (..., 3) [m], inertial axes (north, east, down), such as `result.position`.
 
         Returns:
-            Latitude, longitude from -180 to 180 [deg] and depth [m], (..., 3). NaN for what is no place: not finite, or
-            farther than the other side of the Earth.
+            Latitude, longitude from -180 to 180 [deg] and depth [m], (..., 3). NaN for a position that is not finite, or
+            farther away than the other side of the Earth.
 
         Raises:
             SceneError: If there is no origin.
@@ -134,7 +135,7 @@ class Environment:
         """Return the section [environment] of a scene file.
 
         Returns:
-            gravity [m/s2] and water_density [kg/m3], by name; origin [deg] and start where they are known.
+            {name: value}: gravity [m/s2] and water_density [kg/m3], and origin [deg] and start if they are known.
         """
         content: dict[str, Any] = {"gravity": float(self.gravity), "water_density": float(self.water_density)}
         content |= {} if self.origin is None else {"origin": list(self.origin)}
@@ -145,7 +146,7 @@ NO_ORIGIN = "give the origin of the axes: [environment] origin = [latitude, long
 
 
 def positions_of(environment: Environment, key: str, places: np.ndarray) -> np.ndarray:
-    """Positions (..., 3) [m] of places (..., 3) [deg, deg, m] that a key of the scene has; faults name the key."""
+    """Positions (..., 3) [m] of geodetic points (..., 3) [deg, deg, m]; error messages name the scene's key."""
     from lgvi_warp.common.places import check_places
 
     faults = Faults()
@@ -159,7 +160,7 @@ def positions_of(environment: Environment, key: str, places: np.ndarray) -> np.n
 
 
 def _in_threes(key: str, values: Any, remedy: str) -> np.ndarray:
-    """Read real numbers (..., 3), which may be NaN."""
+    """Read real numbers (..., 3); they may be NaN."""
     faults = Faults()
     array_given = faults.real(key, values, remedy)
     if array_given is not None and array_given.shape[-1:] != (3,):
@@ -170,7 +171,7 @@ def _in_threes(key: str, values: Any, remedy: str) -> np.ndarray:
 
 
 def _moment(text: Any) -> np.datetime64 | None:
-    """The date and time that a text says, in UTC; None where it says none."""
+    """The date and time of a text, in UTC; None if the text has none."""
     try:
         moment = datetime.datetime.fromisoformat(text)
     except (TypeError, ValueError):
@@ -188,8 +189,8 @@ def _moment(text: Any) -> np.datetime64 | None:
 class Start:
     """The state at t = 0.
 
-    Whatever is None (default) is zero, or no rotation. At most one of the two places, one of the four attitudes and one of
-    the two velocities may be given.
+    Values that are None (default) are zero, and an attitude that is None is no rotation. Give at most one of `position` and
+    `geodetic`, one of the four attitudes, and one of the two velocities.
 
     Args:
         position: Position of the body origin (3,) [m], inertial axes (north, east, down).
@@ -200,11 +201,11 @@ class Start:
         velocity: Velocity of the body origin (3,) [m/s], body axes.
         velocity_inertial: Velocity of the body origin (3,) [m/s], inertial axes.
         angular_velocity: Angular velocity (3,) [rad/s], body axes.
-        geodetic: Latitude, longitude [deg, WGS 84] and depth [m] of the body origin (3,), in place of position; the scene's
+        geodetic: Latitude, longitude [deg, WGS 84] and depth [m] of the body origin (3,), instead of position; the scene's
             environment must have an origin.
 
     Raises:
-        SceneError: If anything is wrong; the message lists every fault.
+        SceneError: If a value is invalid; the message lists every fault.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -259,7 +260,7 @@ class Start:
         return chosen
 
     def with_fields(self, fields: Mapping[str, Any]) -> Start:
-        """Return the start with other values, which take the place of those that say the same thing.
+        """Return the start with other values; a new value replaces equivalent ones, such as an attitude in another form.
 
         Args:
             fields: Values by name.
@@ -274,13 +275,13 @@ class Start:
         return replace(self, **(dict.fromkeys(alike) | dict(fields)))
 
     def located(self, environment: Environment) -> Start:
-        """Convert the place on the Earth, if one is given, to a position.
+        """Convert the geodetic coordinates, if given, to a position.
 
         Args:
             environment: The environment of the scene.
 
         Returns:
-            The start that knows its position: a copy, or this one where it has no place on the Earth.
+            The start with its position: a copy, or this object if it has no geodetic coordinates.
 
         Raises:
             SceneError: If the environment has no origin, or a latitude is beyond 90 degrees.
@@ -301,7 +302,7 @@ class Start:
 
 
 def resolve_attitude(values: Mapping[str, np.ndarray]) -> np.ndarray:
-    """R (n, 3, 3), body to inertial, from start values (n, ...) by name, of which one is an attitude in any form."""
+    """R (n, 3, 3), body to inertial, from start values {name: (n, ...)} with an attitude in any form."""
     if "attitude" in values:
         return np.asarray(values["attitude"])
     if "quaternion_wxyz" in values:

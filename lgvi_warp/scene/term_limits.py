@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Plausible ranges of the numbers of terms and events: a rule for each, or the reason for its absence.
+"""Plausible ranges of the numbers of terms and events: a rule for each number, or the reason why it has none.
 
-Rules are by unit, and by name where a unit does not tell. Other checks of `plausibility` look at some numbers more closely.
+A rule depends on the unit of the number, or on its name if the unit is not enough. `plausibility` has further checks.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ Numbers = Mapping[str, np.ndarray]
 
 
 class Rule(NamedTuple):
-    """The largest size of a number that is not odd, of each member (1 or n,), in its unit, and why."""
+    """The largest plausible size of a number for each member (1 or n,), in the number's unit, and the reason."""
 
     largest: Callable[[SceneLike, Numbers], Any]
     why: str
@@ -36,13 +36,13 @@ def _same(value: float, why: str) -> Rule:
 
 
 def volume(scene: SceneLike, p: Numbers) -> np.ndarray:
-    """The displaced volume [m3]; infinite where buoyancy or gravity do not tell it."""
+    """The displaced volume [m3]; infinite if it does not follow from buoyancy and gravity."""
     found = vehicles.displaced_mass(p) / p["environment.water_density"]
     return np.where(np.isfinite(found) & (found > 0.0), found, np.inf)
 
 
 def hull_length(scene: SceneLike, p: Numbers) -> np.ndarray:
-    """The length of the hull (1 or n,) [m]: by its strips or its shape; else of a spheroid of its mass and inertia."""
+    """The length of the hull (1 or n,) [m], from its strips or shape, or else from a spheroid of its mass and inertia."""
     stations = [p[f"{term.key}.stations"] for term in scene.terms if isinstance(term, StripTerm)]
     if stations:
         return np.asarray(np.max(np.broadcast_arrays(*(x[:, -1] - x[:, 0] for x in stations)), axis=0))
@@ -110,7 +110,7 @@ BY_NAME: dict[str, Rule | str] = {
 
 
 def rule_of(kind: Any, item: Any) -> Rule | str | None:
-    """The rule of a number of a term's class, or the reason why it has none; None where nobody has said either."""
+    """The rule of a number of a term's class, or the reason why it has none; None if neither is defined."""
     said = kind.usual.get(word_of(item), kind.usual.get(""))
     if said is not None:
         return said if isinstance(said, str) else _same(*said)
@@ -122,7 +122,7 @@ COMMANDS = ("command", "command_schedule")
 
 
 def sizes(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
-    """Look for numbers of terms that are larger than their rule."""
+    """Look for numbers of terms that are larger than their rule allows."""
     for term in scene.terms:
         if type(term).__module__.startswith("lgvi_warp."):
             unread = COMMANDS if term.driver else COMMANDS[getattr(term, "holds", False) :][:1]
@@ -145,7 +145,7 @@ PUSH = "a thruster that makes {:.3g} N is beyond {:.3g} N, a hundred times the w
 
 
 def thrusts(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
-    """Look for thrusters whose thrust is beyond a hundred times the weight: at their limit, or at held commands."""
+    """Look for thrusters whose thrust at the limit or at constant commands exceeds a hundred times the weight."""
     for term in scene.terms:
         if not isinstance(term, Thrusters):
             continue
@@ -179,7 +179,7 @@ def steepness(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
 
 
 def _worded(say: Callable[..., str], values: np.ndarray, *more: float) -> Callable[[int], str]:
-    """The text of a member's value."""
+    """A function that returns the text for a member's value."""
     return lambda i: say(float(values[i]), *more)
 
 
@@ -202,7 +202,7 @@ DOPPLER = (
 
 
 def doppler(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
-    """Look for waves beside a current that varies: the water's orbit is 1 / (1 - k U / omega) times that in its own frame."""
+    """Look for waves in a varying current, whose orbits change by the factor 1 / (1 - k U / omega)."""
     fields = CURRENTS | {"current_field": "velocities"}
     varying = (term for term in scene.terms if term.type in fields and not term.carries)
     flows = [p[f"{term.key}.{fields[term.type]}"] for term in varying]
@@ -223,7 +223,7 @@ MOST_ROWS = 10_000
 
 
 def _largest(values: np.ndarray) -> np.ndarray:
-    """Values of the largest size among (n, r, k), as (n, k)."""
+    """Values (n, k) of the largest size along the middle axis of (n, r, k)."""
     return np.take_along_axis(values, np.abs(values).argmax(axis=1)[:, None], axis=1)[:, 0]
 
 
@@ -232,7 +232,7 @@ def _shift(ratio: float) -> str:
 
 
 def strips(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
-    """Look for strips that together are much larger than the vehicle, or move with much more water than it does."""
+    """Look for strips whose total volume or added mass is much larger than that of the vehicle."""
     both = "vehicle.added_mass" in p
     added = np.einsum("nii->ni", p["vehicle.added_mass" if both else "vehicle.added_mass_matrix"])[:, 1:3].max(axis=1)
     for term in scene.terms:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Variations by name: the numbers of a scene that a distribution draws, and the unit cube of the sampling points.
 
-A name is that of a number of the scene, "vehicle.mass", of an entry of it, "start.position[2]" or
-"vehicle.inertia[0,1]", or of several that one distribution draws together, "vehicle.mass, vehicle.buoyancy".
+A name refers to a number of the scene, "vehicle.mass"; to an entry of it, "start.position[2]" or
+"vehicle.inertia[0,1]"; or to several numbers with a joint distribution, "vehicle.mass, vehicle.buoyancy".
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ RIGID = ("vehicle.inertia", "vehicle.rigid_body_mass_matrix")
 
 @dataclass(frozen=True)
 class Target:
-    """A number of the scene, or the entry of it that has an index."""
+    """A number of the scene, or one entry of it if `index` is given."""
 
     name: str
     index: tuple[int, ...] | None = None
@@ -45,12 +45,12 @@ class Target:
         return self.name if self.index is None else f"{self.name}[{','.join(map(str, self.index))}]"
 
     def of(self, array: np.ndarray) -> np.ndarray:
-        """Return the target's value out of the whole number."""
+        """Return the target's value from the array of the number."""
         return np.asarray(array if self.index is None else array[self.index])
 
 
 def targets(key: str) -> tuple[Target, ...]:
-    """Read the targets that a key names."""
+    """Parse the targets that a key names."""
     if not isinstance(key, str):
         raise refusal("vary", key, "is not a name of a quantity", 'give names such as "vehicle.mass"')
     if len(key) > LONGEST_KEY:
@@ -67,7 +67,7 @@ def targets(key: str) -> tuple[Target, ...]:
 
 @dataclass(frozen=True, eq=False)
 class Variation:
-    """One key of `vary`, with its distribution and the scene's values of what it draws."""
+    """One key of `vary`, with its distribution and the scene's values of the drawn numbers."""
 
     key: str
     distribution: Any
@@ -76,7 +76,7 @@ class Variation:
 
     @property
     def bases(self) -> list[np.ndarray]:
-        """The scene's values in the form that the distribution draws: of a symmetric matrix, its free entries."""
+        """The scene's values in the form that the distribution draws; a symmetric matrix is given by its free entries."""
         return [self._base(target, array) for target, array in zip(self.targets, self.wholes, strict=True)]
 
     def _base(self, target: Target, array: np.ndarray) -> np.ndarray:
@@ -124,7 +124,7 @@ def diagonal(matrix: np.ndarray) -> bool:
 
 
 def drawn_entries(matrix: np.ndarray) -> np.ndarray:
-    """The entries of a symmetric matrix (d, d) that vary: its diagonal if it is diagonal, else the upper triangle by rows."""
+    """The varied entries of a symmetric matrix (d, d): its diagonal if it is diagonal, else the upper triangle by rows."""
     return np.diag(matrix) if diagonal(matrix) else matrix[np.triu_indices(len(matrix))]
 
 
@@ -143,7 +143,7 @@ def symmetric(drawn: np.ndarray, matrix: np.ndarray) -> np.ndarray:
 
 
 def put(values: dict[str, np.ndarray], target: Target, drawn: np.ndarray, into: bool = False) -> None:
-    """Set the values (n, ...) of a target among the numbers (1 or n, ...) by name; into: in the array that is there."""
+    """Set a target's values (n, ...) among the numbers (1 or n, ...) by name; into: Whether to change the array in place."""
     if target.index is None:
         values[target.name] = drawn
         return
@@ -159,7 +159,7 @@ def put(values: dict[str, np.ndarray], target: Target, drawn: np.ndarray, into: 
 
 
 def _hint(name: str, known: Mapping[str, np.ndarray], also: str) -> str:
-    """Return how to mend a name that the scene does not have."""
+    """Return a remedy for a name that the scene does not have."""
     section = name.split(".")[0]
     others = [key for key in known if key.split(".")[0] == section]
     if name == "start.geodetic":
@@ -171,7 +171,7 @@ def _hint(name: str, known: Mapping[str, np.ndarray], also: str) -> str:
 def known_target(
     faults: Faults, key: str, distribution: Any, target: Target, known: Mapping[str, np.ndarray], also: str = ""
 ) -> bool:
-    """Check that the scene has a target, and note what is wrong."""
+    """Check that the scene has a target; add a fault if it does not."""
     if target.name not in known:
         remedy = functools.partial(_hint, target.name, known, also)
         faults.add(f'"{key}"', distribution, "does not name what the scene has", remedy)
@@ -196,7 +196,7 @@ ROTATIONS = (
 
 
 def variation(faults: Faults, key: str, distribution: Any, known: Mapping[str, np.ndarray]) -> Variation | None:
-    """Match a key of `vary` and its distribution with a scene; None after noting what is wrong."""
+    """Match a key of `vary` and its distribution with a scene; None after adding a fault."""
     if not isinstance(distribution, Distribution):
         remedy = (
             "give lw.distributions.Normal(std=...) or another, or an object with ppf(u), such as scipy.stats.gamma(2.0)"
@@ -217,7 +217,7 @@ def variation(faults: Faults, key: str, distribution: Any, known: Mapping[str, n
 
 
 def _misfit(variation: Variation) -> tuple[str, str] | None:
-    """Return what is wrong with a distribution and its targets, and the remedy; None if they fit."""
+    """Return the problem of a distribution with its targets and the remedy; None if they fit."""
     distribution, named = variation.distribution, variation.targets
     turns = isinstance(distribution, AttitudeDistribution)
     chosen = distribution.kind == "choice" and distribution.joint
@@ -247,7 +247,7 @@ def _misfit(variation: Variation) -> tuple[str, str] | None:
 
 
 def _no_such_matrices(target: Target, values: np.ndarray) -> tuple[str, str] | None:
-    """Return what is wrong with matrices (k, d, d) to choose from, and the remedy; None if they fit the target."""
+    """Return the problem of matrices (k, d, d) to choose from and the remedy; None if they fit the target."""
     if target.name == ATTITUDE and not notation.rotations(values).all():
         which = int(np.argmin(notation.rotations(values)))
         return f"holds a matrix that is not a rotation to 1e-9 (number {which + 1})", "give R^T R = I, det R = 1"
@@ -258,7 +258,7 @@ def _no_such_matrices(target: Target, values: np.ndarray) -> tuple[str, str] | N
 
 
 def clashes(faults: Faults, named: Iterable[tuple[str, tuple[Target, ...]]], done: str = "varied") -> None:
-    """Note every number that is varied twice, by two keys or by one; done: what is done to it."""
+    """Add a fault for every number that is varied twice, by two keys or one; done: verb for the message."""
     taken: dict[str, list[tuple[tuple[int, ...] | None, str]]] = {}
     for key, wanted in named:
         for target in wanted:
@@ -289,7 +289,7 @@ def space(seed: int, variations: Sequence[Variation]) -> Space:
 
 
 def check_names(vary: Mapping[str, Any], parameters: Sequence[str]) -> None:
-    """Check that a scene has the names that vary."""
+    """Check that a scene has the names of all variations."""
     faults = Faults("ensemble.vary.")
     known = [*parameters, *(f"start.{name}" for name in NAMES)]
     for key, distribution in vary.items():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Statistics over members, gathered while a run goes: one module for each kind, a table of them for scene files."""
+"""Statistics over members, gathered during a run: one module for each kind."""
 
 from lgvi_warp.common.doors import names_in_stub
 

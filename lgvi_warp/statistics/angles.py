@@ -27,17 +27,17 @@ HATS = notation.hat(np.eye(3)) + 0.0
 class CircularMean(Statistic):
     """Mean direction of angles [rad], with the resultant length.
 
-    Intervals: normal theory (delta method from the covariance of cosine and sine); the whole circle if the resultant is not
-    significantly above 0. For the length it is the interval of the logarithm of 1 less the length, as for a variance (see
-    Covariance); with two members it is 0 to 1.
+    The interval of the direction follows from normal theory (delta method from the covariance of cosine and sine); it
+    is the whole circle if the resultant is not significantly above 0. The interval of the length is that of the
+    logarithm of 1 minus the length, as for a variance (see Covariance); with two members it is 0 to 1.
 
-    Arrays of the estimate, beside lower, upper and count (k,):
+    Arrays of the estimate, in addition to lower, upper and count (k,):
 
     * value (k, d) [rad]: the mean direction, in (-pi, pi].
-    * resultant_length (k, d): 1 where all angles are equal, 0 where they spread over the circle; with its interval
+    * resultant_length (k, d): 1 if all angles are equal, 0 if they spread over the whole circle; with its interval
       resultant_length_lower, resultant_length_upper.
     * circular_deviation (k, d) [rad]: sqrt(-2 log(resultant_length)).
-    * standard_error (k, d) [rad]: of the mean direction.
+    * standard_error (k, d) [rad]: standard error of the mean direction.
 
     Args:
         of: A quantity in rad, such as "euler[2]" (see lw.statistics.Quantity).
@@ -86,7 +86,7 @@ class CircularMean(Statistic):
     def _estimate(
         self, mean: np.ndarray, variances: tuple[np.ndarray, ...], count: np.ndarray, time: np.ndarray
     ) -> Estimate:
-        """The estimate from the means (k, 2 d) of cosine and sine, their variances and covariance (k, d), and the number."""
+        """The estimate from the means (k, 2 d) of cosine and sine, their variances and covariance (k, d), and the count."""
         n, d = count[:, None], mean.shape[1] // 2
         C, S = mean[:, :d], mean[:, d:]
         length = np.hypot(C, S)
@@ -139,18 +139,18 @@ class CircularMean(Statistic):
 
 @dataclass(frozen=True, eq=False)
 class MeanAttitude(Statistic):
-    """The rotation nearest to the mean of the members' attitudes (chordal mean, Moakher 2002).
+    """The mean attitude: the rotation nearest to the mean of the members' rotation matrices (chordal mean, Moakher 2002).
 
-    Arrays of the estimate, beside count (k,):
+    Arrays of the estimate, in addition to count (k,):
 
     * value (k, 3, 3): the mean rotation; lower, upper: the interval of each entry, to first order.
-    * dispersion (k,) [rad]: sqrt(mean of |R - value|^2 / 2), the root mean square angle where angles are small.
-    * covariance (k, 3, 3) [rad^2]: of v in R = value exp(hat(v)), in body axes, to first order.
+    * dispersion (k,) [rad]: sqrt(mean of |R - value|^2 / 2), for small angles the root mean square angle.
+    * covariance (k, 3, 3) [rad^2]: covariance of v in R = value exp(hat(v)), in body axes, to first order.
     * rotation_half_width (k, 3) [rad]: half the width of the mean's interval about each body axis.
-    * standard_error (k, 3) [rad]: of the mean about each body axis.
+    * standard_error (k, 3) [rad]: standard error of the mean about each body axis.
 
     Args:
-        of: "attitude", the default.
+        of: "attitude", the only quantity and the default.
     """
 
     type: ClassVar[str] = "mean_attitude"
@@ -194,9 +194,9 @@ class MeanAttitude(Statistic):
     def _estimate(
         self, mean: np.ndarray, spread: np.ndarray, of_mean: np.ndarray | None, count: np.ndarray, time: np.ndarray
     ) -> Estimate:
-        """The estimate from the mean (k, 9) of the matrices, their covariance and that of the mean (k, 9, 9), and the number.
+        """The estimate from the mean (k, 9) of the matrices, their and the mean's covariance (k, 9, 9), and the count.
 
-        of_mean: None for that of independent members.
+        of_mean: covariance of the mean; None for independent members.
         """
         few = (count <= 0)[:, None, None]
         M = np.where(few, np.eye(3), mean.reshape(-1, 3, 3))
@@ -230,7 +230,7 @@ class MeanAttitude(Statistic):
         return estimate(self, "delta method on SO(3)", dims, arrays, time, axes, labels=())
 
     def _ends(self, R: np.ndarray, turn: np.ndarray, known: np.ndarray, factor: np.ndarray) -> dict[str, np.ndarray]:
-        """Intervals from the covariance `turn` (k, 3, 3) [rad^2] of small turns of the mean, where it is known."""
+        """Intervals from the covariance `turn` (k, 3, 3) [rad^2] of small rotations of the mean, if it is known."""
         error = np.where(known[:, None], np.sqrt(np.maximum(np.einsum("kii->ki", turn), 0.0)), np.inf)
         some = known & np.isfinite(factor)
         t = np.where(some, factor, 0.0)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The base class of all statistics, and the tables that scene files give them as.
+"""The base class of all statistics, and their tables in scene files.
 
 A block of members is reduced to a part: named arrays that summarise these members. Parts of blocks are joined pairwise
 (see `tree`), and the joined parts are read as estimates. Shapes: k sample times, d components of a quantity, n members,
@@ -65,11 +65,11 @@ class Gatherer:
     """Reduces the samples of one block of members to a part. Abstract."""
 
     def take(self, values: Values, when: slice) -> None:
-        """Take in a quantity of the block's members at some of the run's sample times; each time is taken once, in order."""
+        """Process a quantity of the block's members at some of the run's sample times; each time comes once, in order."""
         raise TypeError(f"{type(self).__name__} is abstract")
 
     def end(self, ends: Ends, replicates: int) -> None:
-        """Take in how and when the block's members ended, after the last sample; member i belongs to replicate i mod R."""
+        """Process the ends of the block's members, after the last sample; member i belongs to replicate i mod R."""
 
     def close(self) -> Part:
         """Return the part that summarises the block."""
@@ -77,7 +77,7 @@ class Gatherer:
 
 
 class RowGatherer(Gatherer):
-    """Gathers one row of each array for each sample time, as the samples come."""
+    """Gathers one row of each array for each sample time, as samples arrive."""
 
     def __init__(self, statistic: Statistic):
         self._statistic, self._rows = statistic, list[Part]()
@@ -97,7 +97,7 @@ class RowGatherer(Gatherer):
 class Statistic(Documented):
     """A statistic over members at every sample time. Abstract.
 
-    Members that failed are left out from their failure on.
+    A member that fails is left out from its failure on.
 
     Args:
         of: A quantity, such as "depth" or "position[2]", a function of (samples, members), or a list of these
@@ -105,11 +105,11 @@ class Statistic(Documented):
         name: Key of the estimate in the result; by default the type and the quantity, as in "mean position".
         confidence: Confidence level of the intervals, between 0 and 1; by default 0.95.
         stopped: "held" keeps a member that an event stopped in its last state; "left_out" excludes it from then on.
-        at: An outcome, such as "floor": evaluate only the members with this outcome, in their final state. By default None:
-            all members, at each sample time.
+        at: An outcome, such as "floor": evaluate only the members with this outcome, in their final state. None, the
+            default: all members, at each sample time.
 
     Raises:
-        SceneError: with every fault.
+        SceneError: if arguments are faulty; the message lists all faults.
     """
 
     type: ClassVar[str] = ""
@@ -168,19 +168,19 @@ class Statistic(Documented):
         faults.raise_if_any()
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle the arguments alone: the other process makes the statistic anew, and finds functions by name."""
+        """Pickle only the arguments: the other process builds the statistic again, and finds functions by name."""
         return partial(type(self), **{argument.name: getattr(self, argument.name) for argument in fields(self)}), ()
 
     def check(self, faults: Faults) -> None:
-        """Note faults in the arguments that the class adds to these."""
+        """Add faults in the arguments that the class defines."""
 
     def meant(self) -> Quantity:
-        """Return the quantity that `of` names; SceneError where it names none."""
+        """Return the quantity that `of` names; SceneError if there is none."""
         return quantity(f"{self.type}.of", self.of)
 
     @property
     def quantity(self) -> Quantity:
-        """The quantity that the statistic is of; SceneError where `of` was not given."""
+        """The quantity of the statistic; SceneError if `of` was not given."""
         meaning: Quantity | None = getattr(self, "_quantity", None)
         if meaning is None:
             door = "metrics" if self.ticks else "statistics"
@@ -190,14 +190,14 @@ class Statistic(Documented):
 
     @property
     def path(self) -> Functional | None:
-        """The expression that it is of, if that looks over the members' paths; else None."""
+        """The expression of the statistic, if it reduces the members' paths; else None."""
         return over_path(self.quantity)
 
     def check_one_number(self, faults: Faults, where: str, number: str) -> None:
-        """Note a fault if it cannot be of one number of each member.
+        """Add a fault if the statistic cannot be taken of one number of each member.
 
-        where: where the statistic stands, such as "then[0].".
-        number: what the number is, "a path_maximum".
+        where: place of the statistic, such as "then[0].".
+        number: text of the number, such as "a path_maximum".
         """
         if not self.of_numbers:
             remark = f"is of samples in time, and {number} is one number of each member"
@@ -212,12 +212,12 @@ class Statistic(Documented):
 
     @property
     def at_text(self) -> str:
-        """The end of the name that says the outcome: " at floor", or ""."""
+        """The end of the name with the outcome: " at floor", or ""."""
         return "" if self.at is None else f" at {self.at}"
 
     @property
     def at_end(self) -> bool:
-        """Whether it is gathered only when the ends of a block's members are known."""
+        """True if it is gathered only when the ends of a block's members are known."""
         return self.of_ends or self.at is not None
 
     @property
@@ -226,20 +226,21 @@ class Statistic(Documented):
         return () if self.at is None else (self.at,)
 
     def at_ends(self, ends: Ends, last: np.ndarray | None) -> tuple[np.ndarray, np.ndarray | None]:
-        """Return the numbers (1, d, n) that it takes from the members' ends, and which count (1, n); None if all do.
+        """Return the numbers (1, d, n) from the members' ends, and a mask (1, n) of members that count; None if all do.
 
-        last: (1, d, n), the quantity at the last sample time, where a stopped member holds its state; None if not needed.
+        last: (1, d, n), the quantity at the last sample time, at which a stopped member holds its state; None if not
+            needed.
         """
         assert self.at is not None
         assert last is not None
         return last, ends.are(self.at)[None]
 
     def over(self, time: np.ndarray) -> Statistic:
-        """Return the statistic with all settings that depend on the run's sample times (k,) [s] filled in."""
+        """Return the statistic with the settings that depend on the run's sample times (k,) [s]."""
         return self
 
     def parts(self) -> tuple[Statistic, ...]:
-        """Return the statistics that its estimates are of: itself, or those that `then` lists."""
+        """Return the statistics of its estimates: itself, or those in `then`."""
         return (self,)
 
     def open(self, time: np.ndarray, count: int) -> Gatherer:
@@ -251,7 +252,7 @@ class Statistic(Documented):
         raise TypeError(f"{type(self).__name__} is abstract")
 
     def rows_of_any(self, values: Values) -> Part:
-        """Return `rows`; of weighted members the sums under the weights, and under their squares (see Weighted)."""
+        """Return `rows`; for weighted members, sums under the weights and under their squares (see Weighted)."""
         if values.weight is None:
             return self.rows(values)
         return self.weighted_rows(values)
@@ -267,7 +268,7 @@ class Statistic(Documented):
         return self.weighted_join(first, second, place)
 
     def weighted_join(self, first: Part, second: Part, place: tuple[int, int]) -> Part:
-        """Return the part of two sets of weighted members together."""
+        """Return the joined part of two sets of weighted members."""
         a, b = Weighted.of(first), Weighted.of(second)
         own, squares = self.join(a.own, b.own, place), self.join(a.squares, b.squares, place)
         return both_measures(own, squares, a.members + b.members)
@@ -284,14 +285,14 @@ class Statistic(Documented):
         raise TypeError(f"{type(self).__name__} is abstract")
 
     def join(self, first: Part, second: Part, place: tuple[int, int]) -> Part:
-        """Return the part of two neighbouring sets of members together.
+        """Return the joined part of two neighbouring sets of members.
 
         place: (level, index) of the joined part in the tree of blocks; (-1, 0) outside the tree.
         """
         raise TypeError(f"{type(self).__name__} is abstract")
 
     def whole(self, parts: Sequence[Part]) -> Part:
-        """Return the part of all members from parts in the order of the blocks, the later ones of fewer members."""
+        """Return the part of all members from parts in the order of the blocks; later parts have fewer members."""
         return reduce(lambda second, first: self.join_any(first, second, (-1, 0)), reversed(parts))
 
     def read(self, part: Part, time: np.ndarray) -> Estimate:
@@ -299,7 +300,7 @@ class Statistic(Documented):
         raise TypeError(f"{type(self).__name__} is abstract")
 
     def estimates(self, parts: Sequence[Part], time: np.ndarray) -> list[Estimate]:
-        """Return the estimates of `self.parts()` where members are independent, from parts in the order of the blocks."""
+        """Return the estimates of `self.parts()` for independent members, from parts in the order of the blocks."""
         return [self.read_any(self.whole(parts), time)]
 
     # With R replicates each array of a part has R rows for each sample time, side by side.
@@ -313,20 +314,20 @@ class Statistic(Documented):
         return [[self.of_replicate(part, r, replicates) for part in parts] for r in range(replicates)]
 
     def estimates_of_replicates(self, parts: Sequence[Part], time: np.ndarray, replicates: int) -> list[Estimate]:
-        """Return the estimates of a run of independent replicates: their intervals are from the replicates' spread."""
+        """Return the estimates of a run of independent replicates, with intervals from the replicates' spread."""
         each = self.each_replicate(parts, replicates)
         (overall,) = self.estimates(together(each), time)
         return [self.spread(overall, [self.estimates(replicate_parts, time)[0] for replicate_parts in each])]
 
     def spread(self, pooled: Estimate, each: Sequence[Estimate]) -> Estimate:
-        """Return the estimate of all members with Student's t interval from the estimate of each replicate."""
+        """Return the estimate of all members, with Student's t interval from the replicates' estimates."""
         error, half = intervals.of_replicates(np.stack([replicate.value for replicate in each]), self.confidence)
         arrays = {"lower": pooled.value - half, "upper": pooled.value + half}
         arrays |= {"standard_error": error} if "standard_error" in pooled.arrays else {}
         return pooled.with_interval(f"Student's t of {len(each)} replicates", arrays)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the scene file's table: its type, `of`, and what differs from the defaults; a function by its name."""
+        """Return the table in a scene file: type, `of`, and settings that differ from the defaults; functions by name."""
         content: dict[str, Any] = {"type": self.type}
         for argument in fields(self):
             value = getattr(self, argument.name)
@@ -342,7 +343,7 @@ def together(each: Sequence[Sequence[Part]]) -> list[Part]:
 
 
 def as_toml(value: Any) -> Any:
-    """Return a value as TOML and JSON can hold it: lists for arrays, tables for statistics, names for functions."""
+    """Convert a value for TOML and JSON: lists for arrays, tables for statistics, names for functions."""
     if isinstance(value, np.ndarray | np.generic):
         return value.tolist()
     if isinstance(value, list | tuple):
@@ -397,7 +398,7 @@ def from_table(where: str, entry: Any) -> Statistic:
 
 
 def with_arguments(kind: type) -> str | None:
-    """The docstring of a class with the arguments that its bases describe, before its own."""
+    """The docstring of a class, with the arguments of its bases before its own."""
     if kind.__doc__ is None:
         return None
     blocks = inspect.cleandoc(kind.__doc__).split("\n\n")

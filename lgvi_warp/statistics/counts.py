@@ -22,7 +22,7 @@ from lgvi_warp.statistics.weighted import Weighted
 
 
 class Counted(Statistic):
-    """A statistic whose part is whole numbers: these add up to the same in any order."""
+    """A statistic whose part is whole numbers, which add up exactly in any order."""
 
     def join(self, first: Part, second: Part, place: tuple[int, int]) -> Part:
         return {key: first[key] + second[key] for key in first}
@@ -36,7 +36,7 @@ class Counted(Statistic):
 
 
 def by_replicates(number: int) -> str:
-    """Return the text that says how an interval of a probability was formed."""
+    """Return the text on the kind of a probability's interval."""
     return f"Wilson with the variance and Student's t of {number} replicates"
 
 
@@ -44,10 +44,10 @@ def by_replicates(number: int) -> str:
 class Histogram(Counted):
     """Fraction of members in each bin, with Wilson's interval for each bin.
 
-    A bin contains its lower edge; the last bin contains its upper edge too. Give either `edges`, or `bins` and
+    A bin contains its lower edge; the last bin also contains its upper edge. Give either `edges`, or `bins` and
     `limits`.
 
-    Arrays of the estimate, beside lower, upper and count (k,):
+    Arrays of the estimate, in addition to lower, upper and count (k,):
 
     * value (k, d, bins): fraction of the members.
     * counts (k, d, bins): number of members.
@@ -56,8 +56,8 @@ class Histogram(Counted):
     Args:
         edges: rising edges of the bins, in the quantity's unit.
         bins: number of equal bins.
-        limits: (low, high) of equal bins, in the quantity's unit; or "run", from the first to the last sample time, for
-            statistics of times (see EndTime).
+        limits: (low, high) of equal bins, in the quantity's unit; or, for statistics of times (see EndTime), "run":
+            from the first to the last sample time.
     """
 
     type: ClassVar[str] = "histogram"
@@ -141,12 +141,12 @@ class Histogram(Counted):
 
 @dataclass(frozen=True, eq=False)
 class Condition(Statistic):
-    """A statistic with a condition: a quantity above a number, below one, or between two: above < x < below.
+    """A statistic with a condition: a quantity above a number, below a number, or between two: above < x < below.
 
     Args:
-        above: one number, or one for each component, in the quantity's unit; None (the default): no limit.
-        below: the same for the upper limit. With neither, the condition holds where a function is not 0, so that a
-            function may return true or false; a quantity by name needs a number.
+        above: lower limit, one number or one for each component, in the quantity's unit; None (the default): no limit.
+        below: upper limit, in the same form. Without limits, the condition holds if a function is not 0, so a function
+            may return true or false; a named quantity needs a limit.
     """
 
     above: Any = None
@@ -180,18 +180,18 @@ class Condition(Statistic):
 
     @property
     def limits_text(self) -> str:
-        """The part of the name that says the limits: " above 50"."""
+        """The part of the name with the limits: " above 50"."""
         bounds = ((word, getattr(self, word)) for word in ("above", "below"))
         return "".join(f" {word} {spelled(limit)}" for word, limit in bounds if limit is not None)
 
     def limits(self, d: int) -> tuple[np.ndarray | None, np.ndarray | None]:
-        """Return above and below as (d, 1) arrays, d the number of components; None where there is no limit."""
+        """Return above and below as arrays (d, 1) for d components; None without a limit."""
         bounds = (None if bound is None else np.asarray(bound, np.float64) for bound in (self.above, self.below))
         above, below = (None if bound is None else np.broadcast_to(bound.reshape(-1, 1), (d, 1)) for bound in bounds)
         return above, below
 
     def holds(self, values: Values) -> np.ndarray:
-        """Return where the condition holds, (k, d, n); false where a member does not count."""
+        """Return the mask (k, d, n) of the condition; false if a member does not count."""
         above, below = self.limits(values.x.shape[1])
         if below is None:
             mask = values.x != 0.0 if above is None else values.x > above
@@ -205,8 +205,8 @@ class Exceedance(Condition, Counted):
     """Probability that a condition holds at each sample time: value (k, d), with Wilson's interval.
 
     Args:
-        above: one number, or one for each component, in the quantity's unit.
-        below: the same for the upper limit; with both, the quantity lies between them.
+        above: lower limit, one number or one for each component, in the quantity's unit.
+        below: upper limit, in the same form; with both limits, the quantity must lie between them.
 
     Examples:
         >>> import lgvi_warp as lw

@@ -17,9 +17,9 @@ STOPPED, FAILED = "stopped", "failed"
 
 @dataclass(frozen=True)
 class Ends:
-    """The ends of n members: `Status` (n,), number of the event that stopped each, from 1, or 0 (n,), and time (n,) [s].
+    """The ends of n members: `Status` (n,), number of the stopping event (n,), from 1, or 0, and time (n,) [s].
 
-    The time is that of the event or of the failure; the end of the run for the others.
+    The time is the time of the event or of the failure; for other members, the end of the run.
     """
 
     status: np.ndarray
@@ -42,11 +42,11 @@ def outcomes(events: Iterable[str], statuses: Iterable[Status]) -> list[str]:
     """Names of the outcomes that members of a scene can have.
 
     Args:
-        events: what its events are called.
-        statuses: those of its events.
+        events: names of the scene's events.
+        statuses: statuses of these events.
 
     Returns:
-        The names of events, their statuses and those of failures, "stopped" and "failed".
+        Names of the events, of their statuses and of failures, and "stopped" and "failed".
     """
     failures = (status for status in Status if not status.stopped)
     names = [*events, STOPPED, FAILED, *(status.name.lower() for status in (*statuses, *failures))]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A metric as one number of each member: read from a text, a table or the statistic, gathered, and looked up."""
+"""A metric as one number of each member: read it from a text, a table or a statistic, and look up its numbers."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from lgvi_warp.statistics.values.functional import functional
 
 
 def names_a_statistic(entry: Any) -> bool:
-    """Whether an entry is a statistic, a table of one, or a text that begins with its type, such as "overshoot depth"."""
+    """True if an entry is a statistic, its table, or a text that begins with its type, such as "overshoot depth"."""
     return isinstance(entry, Statistic | Mapping) or (isinstance(entry, str) and entry.partition(" ")[0] in TYPES)
 
 
 def metric_of(key: str, entry: Any) -> tuple[str, Statistic]:
-    """The name and the statistic of one metric, whose numbers of all members are kept; "max(depth)" is one too."""
+    """Name and statistic of one metric that keeps the numbers of all members; "max(depth)" is also a metric."""
     if isinstance(entry, str):
         word, _, of = entry.partition(" ")
         if names_a_statistic(entry):
@@ -45,10 +45,10 @@ def metric_of(key: str, entry: Any) -> tuple[str, Statistic]:
 
 
 def gathered_name(name: str) -> str:
-    """The name under which a run has the numbers of a metric among its statistics."""
+    """Name of a metric's numbers among the statistics of a run."""
     return f"each {name}"
 
 
 def numbers_of_members(statistics: Mapping[str, Estimate], name: str) -> np.ndarray:
-    """A metric's numbers (n,) out of the statistics of a run: of members that failed, too; infinite where it never ends."""
+    """A metric's numbers (n,) from the statistics of a run, including failed members; infinite if it is never reached."""
     return np.asarray(statistics[gathered_name(name)].value[0, 0])

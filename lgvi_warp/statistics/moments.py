@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Means, covariances and the moments that their errors follow from; joined by shifts to the common mean (Chan 1979)."""
+"""Means, covariances, and the moments for their errors; joined by shifts to the common mean (Chan 1979)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from lgvi_warp.statistics.weighted import Weighted
 
 
 def sums(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return the sums (k, d, d) over members of a_i b_j, of two arrays (k, d, n)."""
+    """Return the sums (k, d, d) over members of a_i b_j, for two arrays (k, d, n)."""
     # BLAS pays only for more than a few rows; pieces keep each product too small for BLAS to start threads of its own.
     if a.shape[1] <= 4:
         return np.einsum("kin,kjn->kij", a, b)
@@ -27,7 +27,7 @@ def sums(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def joined_means(first: Part, second: Part) -> tuple[Part, np.ndarray, np.ndarray]:
-    """Return count (k,) and mean (k, d) of two sets of members, and how far the mean of each lies above it, (k, d) each.
+    """Return count (k,) and mean (k, d) of two joined sets, and each set's mean minus the joined mean, (k, d) each.
 
     docs/theory/estimators.md, (E2).
     """
@@ -40,15 +40,15 @@ def joined_means(first: Part, second: Part) -> tuple[Part, np.ndarray, np.ndarra
 
 
 def outer(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return the products a_i b_j (k, d, d) at each time, of two arrays (k, d)."""
+    """Return the products a_i b_j (k, d, d) at each time, for two arrays (k, d)."""
     return np.asarray(a[:, :, None] * b[:, None, :])
 
 
 def moved(part: Part, a: np.ndarray) -> Part:
-    """Return second to fourth moments about a point that lies `a` (k, d) below the mean, (k, d, d) each.
+    """Return second to fourth moments about the mean minus `a` (k, d), (k, d, d) each.
 
-    With x less its mean: m11[i, j] is the sum of x_i x_j, m21 of x_i^2 x_j, m22 of x_i^2 x_j^2 (where the part has these).
-    About the point they are the sums of (x_i + a_i) (x_j + a_j) and so on.
+    For x minus its mean, m11[i, j] is the sum of x_i x_j, m21 of x_i^2 x_j, m22 of x_i^2 x_j^2 (if the part has these).
+    About the new point they are the sums of (x_i + a_i) (x_j + a_j) and so on.
     """
     n, m11, aa = part["count"][:, None, None], part["m11"], outer(a, a)
     moments = {"m11": m11 + n * aa}
@@ -64,7 +64,7 @@ def moved(part: Part, a: np.ndarray) -> Part:
 
 
 def joined(first: Part, second: Part) -> Part:
-    """Return the moments of two sets of members together, about their common mean."""
+    """Return the moments of two joined sets of members about their common mean."""
     both, a, b = joined_means(first, second)
     moments, more = moved(first, a), moved(second, b)
     return both | {key: moments[key] + more[key] for key in moments}
@@ -77,7 +77,7 @@ def empty_as_nan(values: np.ndarray, count: np.ndarray, least: int = 1) -> np.nd
 
 
 def component_dims(*names: str) -> Dims:
-    """Return the dimensions (time, component) of several arrays, and (time,) of the count."""
+    """Return the dimensions (time, component) of several arrays, and (time,) for the count."""
     return {"count": ("time",)} | along(names, "time", "component")
 
 
@@ -85,11 +85,11 @@ def component_dims(*names: str) -> Dims:
 class Mean(Statistic):
     """Mean and standard deviation over members, with Student's t interval of the mean.
 
-    Arrays of the estimate, beside lower, upper and count (k,):
+    Arrays of the estimate, in addition to lower, upper and count (k,):
 
     * value (k, d): the mean.
-    * standard_deviation (k, d): of the members.
-    * standard_error (k, d): of the mean.
+    * standard_deviation (k, d): standard deviation of the members.
+    * standard_error (k, d): standard error of the mean.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -136,7 +136,7 @@ class Mean(Statistic):
     def _estimate(
         self, mean: np.ndarray, deviation: np.ndarray, error: np.ndarray, count: np.ndarray, time: np.ndarray
     ) -> Estimate:
-        """The estimate from the mean, the deviation of members and the error of the mean (k, d), and their number (k,)."""
+        """The estimate from the mean, the members' deviation and the mean's error (k, d), and the number of members (k,)."""
         n = count[:, None]
         lower, upper = intervals.about(mean, error, intervals.student(n, self.confidence))
         arrays = {"value": mean, "lower": lower, "upper": upper, "standard_error": error}
@@ -149,19 +149,19 @@ class Covariance(Statistic):
     """Covariance matrix over members, within one quantity or across several.
 
     Interval: Student's t (n - 2) with the standard error from the members' own fourth moments (delta method), which
-    does not assume normal members. For a variance it is the interval of its logarithm, which is nearer to normal.
-    Fourth moments of few members are biased towards small values: the bias of normal members is corrected, a term of order
-    1 / n (Bonett 2006 for variances). With two members the interval is infinite.
+    does not assume normal members. For a variance it is the interval of the logarithm, which is closer to normal.
+    Fourth moments of few members are biased towards small values; the bias for normal members, a term of order 1 / n,
+    is corrected (Bonett 2006 for variances). With two members the interval is infinite.
 
-    Arrays of the estimate, beside lower, upper and count (k,):
+    Arrays of the estimate, in addition to lower, upper and count (k,):
 
-    * value (k, d, d): the covariance, divided by n - 1.
-    * standard_error (k, d, d): of the covariance.
-    * correlation (k, d, d): without an interval.
+    * value (k, d, d): the covariance, with divisor n - 1.
+    * standard_error (k, d, d): standard error of the covariance.
+    * correlation (k, d, d): the correlation, without an interval.
     * mean (k, d): the mean.
 
     Args:
-        of: a quantity, or several: of=("position", "speed") takes four components together.
+        of: a quantity, or several: of=("position", "speed") has four components.
     """
 
     type: ClassVar[str] = "covariance"
@@ -229,7 +229,7 @@ class Covariance(Statistic):
 
     @staticmethod
     def _ends(value: np.ndarray, error: np.ndarray, factor: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Interval value -+ factor error; for variances s^2 exp(-+ factor error / s^2), from 0 if it is unbounded."""
+        """Interval value -+ factor error; for variances s^2 exp(-+ factor error / s^2), or from 0 if unbounded."""
         diagonal = np.eye(value.shape[-1], dtype=bool)
         both = zip(intervals.of_logarithm(value, error, factor), intervals.about(value, error, factor), strict=True)
         lower, upper = (np.where(diagonal, variance, covariance) for variance, covariance in both)

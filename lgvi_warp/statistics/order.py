@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Extremes and quantiles: statistics of the members' order."""
+"""Extremes and quantiles: order statistics of the members."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ EndsOf = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 class Extremes(Statistic):
     """Smallest and largest value over members, and the members that have them.
 
-    There is no interval for extremes of members that were not drawn; `beyond` bounds what lies outside instead.
+    An extreme has no confidence interval; instead, `beyond` bounds the fraction of members outside.
 
-    Arrays of the estimate, beside count (k,):
+    Arrays of the estimate, in addition to count (k,):
 
     * minimum, maximum (k, d): the extremes; value is the maximum.
-    * minimum_member, maximum_member (k, d): indices of the members that have them; -1 where no member counts.
-    * beyond (k,): with the statistic's confidence, at most this fraction of all members that could be drawn lies above
-      the maximum, and at most this fraction below the minimum.
+    * minimum_member, maximum_member (k, d): indices of the members that have them; -1 if no member counts.
+    * beyond (k,): with the statistic's confidence, at most this fraction of the distribution lies above the maximum,
+      and at most this fraction below the minimum.
     """
 
     type: ClassVar[str] = "extremes"
@@ -94,12 +94,12 @@ class Extremes(Statistic):
 
 @dataclass(frozen=True, eq=False)
 class Quantiles(Statistic):
-    """Quantiles over members: exact for up to `size` members, beyond that from a sketch with a proven error bound.
+    """Quantiles over members: exact for up to `size` members, for more members from a sketch with a proven error bound.
 
-    Interval: from the ranks of the sorted values (binomial, no assumption on the distribution), widened by the sketch's
-    standard error; infinite where too few members lie beyond the level. Each replicate has a sketch of its own.
+    Interval: from the ranks of the sorted values (binomial, for any distribution), widened by the sketch's standard
+    error; infinite if too few members lie beyond the level. Each replicate has its own sketch.
 
-    Arrays of the estimate, beside lower, upper and count (k,):
+    Arrays of the estimate, in addition to lower, upper and count (k,):
 
     * value (k, levels, d): the quantiles.
     * rank_error (k,): proven bound on the error of the rank, as a fraction of the members. Typical errors are several
@@ -108,7 +108,7 @@ class Quantiles(Statistic):
     Args:
         levels: fractions between 0 and 1; by default (0.05, 0.25, 0.5, 0.75, 0.95).
         size: number of values that each level of the sketch keeps, a power of two from 64; by default 2048. Below 256
-            no block is exact, however few its members.
+            no block is exact, even with few members.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -156,7 +156,7 @@ class Quantiles(Statistic):
         return self._weighted_whole([first, second], self.size)
 
     def _weighted_whole(self, parts: Sequence[Part], size: int | None) -> Part:
-        """The parts of weighted members as one, thinned to a size; None: not."""
+        """Join the parts of weighted members, thinned to `size` values; None keeps all values."""
         each = [Weighted.of(part) for part in parts]
         kept = weighted_sketch.together([part.own for part in each], size)
         own, squares, members = (
@@ -183,7 +183,7 @@ class Quantiles(Statistic):
     def _in_pieces(
         self, parts: Sequence[Part], time: np.ndarray, replicates: int, read: Callable[..., Estimate]
     ) -> list[Estimate]:
-        """Read some sample times after others: sorting all at once would take more memory than the sketches do."""
+        """Read a few sample times at once: sorting all at once would need more memory than the sketches."""
         numbers = sum(part["values"][0].size for part in parts) * replicates
         rows = max(1, SORTED_AT_ONCE // numbers)
         pieces = []
@@ -229,7 +229,7 @@ class Quantiles(Statistic):
         return estimate(self, "Woodruff: fractions below the value", dims, arrays, time, {"level": level})
 
     def _read_replicates(self, each: Sequence[Sequence[Part]], time: np.ndarray) -> Estimate:
-        """Take ranks from the spread of the replicates' fractions up to the quantile of all (Woodruff 1952)."""
+        """Quantiles with ranks from the spread of the replicates' fractions below the joint quantile (Woodruff 1952)."""
         overall = self.whole(together(each))
         n, level = overall["count"][:, None, None], np.array(self.levels)[None, :, None]
 

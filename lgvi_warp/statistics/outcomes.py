@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Statistics of how members end: the probability of an outcome by time, and statistics of the time at which it came."""
+"""Statistics of the members' ends: the probability of an outcome by time, and statistics of its time."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def _nothing(samples: Any, members: Any) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class OfEnds(Statistic):
-    """A statistic of how members end. Abstract.
+    """A statistic of the members' ends. Abstract.
 
     Args:
         of: an outcome: the name of an event, a status, "stopped" or "failed".
@@ -48,7 +48,7 @@ class OfEnds(Statistic):
     of_ends: ClassVar[bool] = True
 
     def meant(self) -> Quantity:
-        """Return a quantity with the outcome's name, which needs no samples; SceneError where `of` is no name."""
+        """Return a quantity with the outcome's name, which needs no samples; SceneError if `of` is not a name."""
         if not isinstance(self.of, str) or not self.of:
             remedy = 'give "floor", the name of an event of the scene, "stopped" or "failed"'
             raise refusal(f"{self.type}.of", self.of, "is not an outcome", remedy)
@@ -60,7 +60,7 @@ class OfEnds(Statistic):
 
 
 class _AtEnd(Gatherer):
-    """Gathers the ends of a block's members, which come at once."""
+    """Gathers the ends of a block's members, which arrive all at once."""
 
     def __init__(self, part_of: Callable[[Values], Part]):
         self._part_of = part_of
@@ -73,7 +73,7 @@ class _AtEnd(Gatherer):
 
 
 def _endings(values: Values) -> Part:
-    """Members that ended before the run did, from x (replicates, 2, members), time [s] and kind of each end."""
+    """Members that ended before the run, from x (replicates, 2, members): time [s] and kind of each end."""
     time, kind = values.x[:, 0], values.x[:, 1]
     replicate, member = np.nonzero(kind != NOT)
     ends = {
@@ -91,32 +91,32 @@ def _endings(values: Values) -> Part:
 
 @dataclass(frozen=True, eq=False)
 class Outcome(OfEnds):
-    """Probability that a member has ended by an outcome by each time.
+    """Probability that a member has ended with an outcome, by each time.
 
-    The probability is Aalen & Johansen's estimate (1978), the cumulative incidence: a member that another event stopped can
-    no longer have this outcome. A member that fails counts until then (it is censored), unless the outcome is a failure. If
-    none fails, it is the fraction of all members. The probabilities of all events and of "ok", which comes at the end of
-    the run, have the sum 1. Interval: Wilson's with the number of members whose fraction has the variance of a Dirichlet
-    product: that of all members if none fails. Times are those of the events, not of samples.
+    The probability is Aalen & Johansen's estimate (1978) of the cumulative incidence: a member that another event stopped
+    can no longer have this outcome. A member that fails is censored at its failure, unless the outcome is a failure. If no
+    member fails, the estimate is the fraction of all members. The probabilities of all events and of "ok", which occurs at
+    the end of the run, sum to 1. Interval: Wilson's, with the number of members whose fraction has the variance of a
+    Dirichlet product; if none fails, this is the number of all members. Times are event times, not sample times.
 
-    Arrays of the estimate, beside lower and upper:
+    Arrays of the estimate, in addition to lower and upper:
 
     * value (k,): the probability; survival is 1 - value.
-    * alone (k,): Kaplan & Meier's estimate (1958), in which other events censor too: the probability if no other event
-        stopped members. It assumes that the stopped members would have continued like the others, which no run can show and
-        which rarely holds (a vehicle that surfaces does not sink); alone_lower, alone_upper.
-    * fraction (k,): members that have ended by the outcome, as a fraction of all members, including those that failed;
+    * alone (k,): Kaplan & Meier's estimate (1958), in which other events also censor: the probability if no other event
+        stopped members. It assumes that the stopped members would have continued like the others. No run can show this,
+        and it rarely holds (a vehicle that surfaces does not sink). Its interval: alone_lower, alone_upper.
+    * fraction (k,): members that have ended with the outcome, as a fraction of all members, including failed members;
       fraction_lower, fraction_upper: Wilson's interval.
-    * ended, otherwise, failed (k,): number of members that have ended by the outcome, otherwise, and of the latter by a
-      failure, by each time.
+    * ended, otherwise, failed (k,): by each time, number of members that have ended with the outcome, that have ended
+      otherwise, and that have ended otherwise by a failure.
     * count (k,): number of members at risk at each time.
-    * end_time (levels,) [s]: time by which that fraction of the members has ended so, infinite if it never has;
-      end_time_lower, end_time_upper from the interval of value.
+    * end_time (levels,) [s]: time by which this fraction of the members has ended with the outcome, infinite if never;
+      end_time_lower, end_time_upper follow from the interval of value.
 
     Args:
         of: "floor", "surface", the name of any event of the scene, "stopped" (by any event), a failure, or "failed" (by
             any).
-        name: Key of the estimate in the result; by default the type and the outcome, as in "outcome floor".
+        name: Key of the estimate in the result; by default the type and the outcome, such as "outcome floor".
         levels: fractions of members between 0 and 1; by default (0.05, 0.5, 0.95).
 
     Examples:
@@ -216,7 +216,7 @@ class Outcome(OfEnds):
 
     @staticmethod
     def _by(part: Part, kind: float, time: np.ndarray, power: int = 1) -> np.ndarray:
-        """Number of members with an outcome by each time; of weighted ones effective members, or sums of squares."""
+        """Number of members with an outcome by each time; for weighted members, effective numbers, or sums of squares."""
         so = part["kind"] == kind
         order = np.argsort(part["time"][so], kind="stable")
         by = np.searchsorted(part["time"][so][order], time, "right")
@@ -230,28 +230,28 @@ Pair = tuple[np.ndarray, np.ndarray]
 
 
 def _weighted(part: Part) -> Weighted:
-    """The sums of the weights of all members, of a part of weighted ones."""
+    """The sums of the weights of all members, from a part of weighted members."""
     return Weighted({"count": part["weight"]}, {"count": part["square"]}, part["members"])
 
 
 def _scale(part: Part) -> float:
-    """Factor from weights to effective members; 1 for members that count alike."""
+    """Factor from weights to effective members; 1 for members without weights."""
     return float((part["weight"] / part["square"])[0]) if "weight" in part else 1.0
 
 
 def _total(part: Part) -> Any:
-    """Number of members, or the effective number of weighted ones."""
+    """Number of members, or the effective number of weighted members."""
     return float(_weighted(part).effective[0]) if "weight" in part else int(part["members"].sum())
 
 
 def _steps_of(part: Part) -> np.ndarray:
-    """Times [s] at which the curves step. Between them the order of other ends matters only if members fail."""
+    """Times [s] at which the curves step. Other ends are included only if members fail, since then their order matters."""
     lost = bool((part["kind"] == LOST).any())
     return np.asarray(part["time"][part["kind"] != LOST if lost else part["kind"] == SO])
 
 
 def _curves(part: Part, at: np.ndarray) -> tuple[PassageCurve, PassageCurve]:
-    """Aalen & Johansen's curve at rising times `at` [s], and Kaplan & Meier's, in which other events censor too."""
+    """Aalen & Johansen's curve at rising times `at` [s], and Kaplan & Meier's, in which other events also censor."""
     weights = part["of_member"] * _scale(part) if "weight" in part else None
 
     def counted(which: np.ndarray, side: Literal["left", "right"]) -> np.ndarray:
@@ -267,7 +267,7 @@ def _curves(part: Part, at: np.ndarray) -> tuple[PassageCurve, PassageCurve]:
 def _counted(
     at: np.ndarray, times: np.ndarray, side: Literal["left", "right"], weights: np.ndarray | None = None
 ) -> np.ndarray:
-    """Number of the times [s] that fall to each of `at`, or the sum of their weights; later times fall to none."""
+    """Number of the times [s] assigned to each of `at`, or the sum of their weights; later times are left out."""
     return np.bincount(np.searchsorted(at, times, side), weights, len(at))[: len(at)]
 
 
@@ -281,17 +281,17 @@ def _reached(curve: np.ndarray, levels: np.ndarray, at: np.ndarray) -> np.ndarra
 
 @dataclass(frozen=True, eq=False)
 class EndTime(OfEnds, MemberStatistic):
-    """Statistics of the time [s] at which members ended by an outcome, over the members that did.
+    """Statistics of the time [s] at which members ended with an outcome, over the members with this outcome.
 
-    Members that end by another outcome, or reach the end of the run, are left out; Outcome takes them into account.
+    Members with another outcome, or that reach the end of the run, are left out; Outcome takes them into account.
 
     Args:
         of: "floor", "surface", the name of any event of the scene, "stopped" (by any event), a failure, or "failed" (by
             any).
-        name: Key of the estimate in the result; by default the type and the outcome, as in "outcome floor".
-        then: statistic of these times over the members, or a list, each without its `of`; by default the mean, quantiles
-            and a histogram of 20 bins over the
-            run: "mean end_time floor", "quantiles end_time floor", "histogram end_time floor".
+        name: Key of the estimate in the result; by default the type and the outcome, such as "outcome floor".
+        then: statistic of these times over the members, or a list of statistics, each without its `of`; by default the mean,
+            quantiles and a histogram of 20 bins over the run: "mean end_time floor", "quantiles end_time floor", "histogram
+            end_time floor".
     """
 
     type: ClassVar[str] = "end_time"

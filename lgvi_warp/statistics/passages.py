@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Times at which a condition first holds, and the curve of the probability to have passed by each time."""
+"""Times at which a condition first holds, and the curve of the probability of passing by each time."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ NOBODY = 1e-12
 
 
 class _Passages(Gatherer):
-    """Follows a block, its members by replicate: the first sample that shows the condition, or the last known."""
+    """Finds, for each member of a block, the first sample at which the condition holds, or the last known sample."""
 
     def __init__(self, statistic: FirstPassage, time: np.ndarray, count: int):
         self._statistic, self._time, self._times = statistic, time, len(time)
@@ -64,7 +64,7 @@ class _Passages(Gatherer):
         self._before = x[-1]
 
     def _place(self, x: np.ndarray, when: slice, now: np.ndarray) -> None:
-        """Set when, between the previous sample and this one, these members passed: linear between the two."""
+        """Set the passage times of these members between the previous sample and this one, by linear interpolation."""
         above, below = self._statistic.limits(1)
         if self._before is None or (above is None and below is None):
             return
@@ -76,7 +76,7 @@ class _Passages(Gatherer):
         self._share[now] = (limit - before) / (x[at, now] - before)
 
     def end(self, ends: Ends, replicates: int) -> None:
-        """Correct passages of stopped members, whose last state came before the second sample; the others never pass."""
+        """Correct passages of members that stopped between the two samples; members that stopped otherwise never pass."""
         end = ends.time.reshape(-1, replicates).T.ravel()
         stopped = ends.are(STOPPED).reshape(-1, replicates).T.ravel()
         never = stopped & (self._passed == self._times) & (self._known == self._times)
@@ -93,7 +93,7 @@ class _Passages(Gatherer):
         return both_measures(own, squares, np.array([np.count_nonzero(self._weight)]))
 
     def _part(self, weights: np.ndarray | None) -> Part:
-        """Numbers of members that pass, are lost and stop by each time, or the sums of their weights."""
+        """Numbers of members that pass, are lost and stop at each time, or the sums of their weights."""
         R, length = self._replicates, self._times + 1
         row = np.repeat(np.arange(R), len(self._passed) // R) * length
         piece = np.clip(np.floor(self._share * PIECES), 0, PIECES - 1).astype(np.int64)
@@ -111,34 +111,34 @@ def _of(weights: np.ndarray | None, which: np.ndarray) -> np.ndarray | None:
 
 @dataclass(frozen=True, eq=False)
 class FirstPassage(Condition, Counted):
-    """Time until a condition first holds, as the samples show it.
+    """Time until a condition first holds, determined from the samples.
 
-    The probability is Aalen & Johansen's estimate. A member that an event stopped in a state in which the condition does
-    not hold never passes; with stopped="left_out" it is censored: its chance to pass later is taken as that of the others.
-    A member that fails before it passes counts until its last good sample; NaN where no member is known at any time. If
-    none fails, the probability is the fraction of all members. Interval: Wilson's with the number of members whose fraction
-    has the variance of a beta product (Fay, Brittain & Proschan 2013), which accounts for few members at risk; where no
-    member is at risk, its upper end allows for all unknown members.
+    The probability is Aalen & Johansen's estimate. A member that an event stopped in a state in which the condition
+    does not hold never passes; with stopped="left_out" it is censored: its chance of passing later is assumed to equal
+    that of the others. A member that fails before it passes counts until its last valid sample. The estimate is NaN if
+    no member is known at any time. If none fails, the probability is the fraction of all members. Interval: Wilson's,
+    with the number of members whose fraction has the variance of a beta product (Fay, Brittain & Proschan 2013), which
+    accounts for few members at risk. If no member is at risk, its upper end allows for all unknown members.
 
-    A member passes between the sample before and the sample that shows it, where the line between the two crosses the
-    limit; a quantity without a limit, which is true or false, passes at the sample that shows it. A passage that comes
-    and goes between two samples is not seen (an event of the scene looks at every step).
+    If the condition holds at a sample but not at the one before, the member passes where the line between the two
+    crosses the limit. A quantity without a limit, which is true or false, passes at the sample. A condition that holds
+    only between two samples is missed (an event of the scene checks every step).
 
-    Arrays of the estimate, beside lower and upper:
+    Arrays of the estimate, in addition to lower and upper:
 
-    * value (k,): probability to have passed by each time; survival is 1 - value.
+    * value (k,): probability of passing by each time; survival is 1 - value.
     * passed (k,): number of members that pass at each time.
-    * lost (k,): number of members that failed before each time without having passed.
-    * stopped (k,): number of members that an event stopped at each time, or since the one before, without having passed.
+    * lost (k,): number of members that failed before each time without passing.
+    * stopped (k,): number of members that an event stopped at each time, or since the time before, without passing.
     * count (k,): number of members at risk of passing at each time.
     * censored: number of members that were under way to the end and did not pass.
-    * passage_time (levels,) [s]: time by which that fraction has passed, infinite if it never has; passage_time_lower,
-      passage_time_upper from the interval of value.
+    * passage_time (levels,) [s]: time by which this fraction has passed, infinite if never; passage_time_lower,
+      passage_time_upper follow from the interval of value.
 
     Args:
         of: A quantity of one component, such as "depth" or "position[2]" (see lw.statistics.Quantity).
         above: the lower limit, in the quantity's unit.
-        below: the upper limit; with both, the quantity lies between them.
+        below: the upper limit; with both limits, the quantity must lie between them.
         levels: fractions of members between 0 and 1; by default (0.05, 0.5, 0.95).
     """
 
@@ -178,7 +178,7 @@ class FirstPassage(Condition, Counted):
         return replace(estimate, arrays=arrays, dims=dims, interval=interval)
 
     def _estimate(self, part: Part, curve: PassageCurve, number: np.ndarray, time: np.ndarray) -> Estimate:
-        """The estimate from the curve, and the number (k, pieces) of members behind each probability."""
+        """The estimate from the curve, and the number (k, pieces) of members for each probability."""
         lower, upper = curve.ends(*intervals.wilson(curve.value, number, self.confidence))
         passed, lost, stopped = part["passed"][0, :-1].sum(axis=1), part["lost"][0], part["stopped"][0, :-1]
         arrays = {"value": curve.value[:, -1], "lower": lower[:, -1], "upper": upper[:, -1]}
@@ -223,16 +223,16 @@ class FirstPassage(Condition, Counted):
 
 
 def check_levels(faults: Faults, levels: Any) -> None:
-    """Note a fault if levels are no fractions between 0 and 1."""
+    """Add a fault unless levels are fractions between 0 and 1."""
     numbers = faults.finite("levels", levels)
     if numbers is not None and (numbers.ndim != 1 or np.any(numbers <= 0.0) or np.any(numbers >= 1.0)):
         faults.add("levels", levels, "are not numbers between 0 and 1", "give (0.05, 0.5, 0.95)")
 
 
 def design_effect(weighted: Weighted, share: np.ndarray, squares: np.ndarray) -> np.ndarray:
-    """Ratio of members behind a fraction (...) of the weight to the effective number.
+    """Equivalent number of members of a weighted fraction (...), divided by the effective number of all members.
 
-    Share, squares: sums of what it counts.
+    share, squares: sums of the weights, and of their squares, of the members that the fraction counts.
     """
     fraction = (share / weighted.weight[0]).ravel()[None]
     number = weighted.number_of(fraction, squares.ravel()[None]) / np.maximum(weighted.effective[0], 1e-300)
@@ -240,17 +240,17 @@ def design_effect(weighted: Weighted, share: np.ndarray, squares: np.ndarray) ->
 
 
 class PassageCurve:
-    """Probability to have passed, by Aalen & Johansen (1978), at the end of each piece of the times before the samples.
+    """Probability of passing, by Aalen & Johansen (1978), at the end of each piece of the intervals between samples.
 
-    A member that ends otherwise passes no more; if none does, this is Kaplan & Meier's curve (1958). A member that is lost
-    is known up to the sample before, and is at risk in no later piece.
+    A member that ends otherwise no longer passes; without such members, this is Kaplan & Meier's curve (1958). A lost
+    member is known up to the sample before, and is not at risk in any later piece.
 
     passed: (k, pieces), number of members that pass in each piece.
     others: (k, pieces), number of members that end otherwise in each piece.
     lost: (k,), number of members that are lost before each time.
 
     Attributes:
-        value: (k, pieces), estimated probability to have passed; the fraction of all members as long as none is lost.
+        value: (k, pieces), estimated probability of passing; the fraction of all members as long as none is lost.
         risk: (k,), number of members at risk of passing at each sample time.
         left: (k, pieces), number of members still at risk at the end of each piece.
         members: (k, pieces), number of independent members that would give the same variance.
@@ -284,13 +284,14 @@ class PassageCurve:
 
     @staticmethod
     def _members(n: np.ndarray, now: np.ndarray, so_far: np.ndarray) -> np.ndarray:
-        """Number of members whose fraction has the variance of a sum over Dirichlet variables, one for each time.
+        """Number of members whose fraction has the variance of a sum of Dirichlet variables, one for each time.
 
-        Where x of n members pass and o end otherwise, the shares of those that pass, end otherwise and stay are
-        Dirichlet(x, o, n - x - o + 1), and of the last ones Beta(1/2, staying + 1/2) pass. If none ends otherwise, this is
-        between the two beta products of Fay, Brittain & Proschan (2013, Biostatistics 14), as Jeffreys' interval is between
-        Clopper & Pearson's limits; if none is lost, it is Jeffreys' Beta(m + 1/2, n - m + 1/2), and the number is that of
-        all members. Where few are at risk the variance of Greenwood's kind is far too small.
+        If x of n members pass and o end otherwise, the shares of those that pass, end otherwise and stay are
+        Dirichlet(x, o, n - x - o + 1); of those that finally stay, a share Beta(1/2, staying + 1/2) passes. If none
+        ends otherwise, this lies between the two beta products of Fay, Brittain & Proschan (2013, Biostatistics 14), as
+        Jeffreys' interval lies between Clopper & Pearson's limits. If none is lost, it is Jeffreys' Beta(m + 1/2, n - m
+        + 1/2), and the result is the number of all members. With few members at risk, Greenwood's variance would be far
+        too small.
 
         n: (k, 1), members at risk at each time.
         now: (k, pieces), members that passed since the time before.
@@ -320,9 +321,9 @@ class PassageCurve:
         return np.asarray(np.maximum(F * (1.0 - F) / var_F - 2.0, 0.0))
 
     def ends(self, lower: np.ndarray, upper: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return an interval (k, pieces) that contains the value, widened where nothing is known.
+        """Return an interval (k, pieces) that contains the value, widened if nothing is known.
 
-        After the last member at risk all that were lost may pass at once; without any member the interval is 0 to 1.
+        After the last member at risk, all lost members may pass at once; without any member the interval is 0 to 1.
         """
         nobody = not self.risk[0]
         most = np.minimum(1.0, 1.0 - self._otherwise + (upper - self.value))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Errors of tracking: wanted minus actual depth, heading, speed and place, and the distance from the path."""
+"""Tracking errors: desired minus actual depth, heading, speed and position, and the distance from the path."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ def wrapped(angle: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Channel:
-    """One number of the motion that is wanted and that the vehicle has.
+    """One number of the motion with a desired and an actual value.
 
-    actual: function of the samples that returns the vehicle's numbers (k, n).
-    wanted: name of the signal that is wanted, (k, n) or, with `entry`, (k, n, 3).
-    entry: index of the wanted number in its signal; None (the default): it is one number.
-    wish: what guidance calls it, and what of that is wanted: ("depth", None) or ("position", 0); None for none.
+    actual: function of the samples that returns the actual numbers (k, n).
+    wanted: name of the desired signal, (k, n) or, with `entry`, (k, n, 3).
+    entry: index of the desired number in its signal; None (the default): the signal is one number.
+    wish: name in guidance and index of the number: ("depth", None) or ("position", 0); None for none.
     """
 
     name: str
@@ -52,27 +52,27 @@ class Channel:
     entries: tuple[int, ...] = ()
 
     def difference(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        """Return a - b (k, n) [unit], wrapped where these are angles."""
+        """Return a - b (k, n) [unit], wrapped for angles."""
         return wrapped(a - b) if self.angle else a - b
 
     def reference(self, samples: Mapping[str, np.ndarray]) -> np.ndarray:
-        """Return what is wanted at each tick, (k, n) [unit]."""
+        """Return the desired number at each tick, (k, n) [unit]."""
         values = samples[self.wanted].astype(np.float64, copy=False)
         return values if self.entry is None else values[..., self.entry]
 
     def error(self, samples: Fields, members: Members) -> np.ndarray:
-        """Return what is wanted less what is, (k, n) [unit]."""
+        """Return desired minus actual number, (k, n) [unit]."""
         return self.difference(self.reference(samples), self.actual(samples))
 
     def course(self, samples: Fields, members: Members) -> np.ndarray:
-        """Return what is and its goal, (k, n, 2) [unit]: the set point before any reference model; else what is wanted."""
+        """Return actual number and goal, (k, n, 2) [unit]: the set point before any reference model, else the desired."""
         y, goal = self.actual(samples), self._set_point(samples.controller, members)
         goal = self.reference(samples) if goal is None else np.broadcast_to(goal, y.shape)
         # Side by side in memory as they are used: components before members.
         return np.moveaxis(np.stack([y, goal], axis=1), 1, 2)
 
     def _set_point(self, controller: Any, members: Members) -> np.ndarray | None:
-        """Values that the members' set points want, (1,) or (n,); None where another kind of guidance says it."""
+        """Values of the members' set points, (1,) or (n,); None if another kind of guidance gives the number."""
         if controller is None or self.wish is None:
             return None
         wish, entry = self.wish
@@ -123,18 +123,18 @@ CHANNELS = {measured: _channels(measured) for measured in (False, True)}
 
 
 def _away(samples: Mapping[str, np.ndarray], place: str) -> np.ndarray:
-    """Wanted less actual place, (k, n, 3) [m]."""
+    """Desired minus actual position, (k, n, 3) [m]."""
     return np.asarray(samples["reference_position"].astype(np.float64, copy=False) - samples[place])
 
 
 def _distance(samples: Fields, members: Members, place: str) -> np.ndarray:
-    """Distance (k, n) [m] from the wanted place."""
+    """Distance (k, n) [m] from the desired position."""
     e = _away(samples, place)
     return np.sqrt(e[..., 0] ** 2 + e[..., 1] ** 2 + e[..., 2] ** 2)
 
 
 def _cross_track(samples: Fields, members: Members, place: str) -> np.ndarray:
-    """Horizontal distance (k, n) [m] from the wanted place, or from the line through it along the wanted velocity, if any."""
+    """Horizontal distance (k, n) [m] from the desired position, or from the line along the desired velocity through it."""
     e, v = _away(samples, place), samples["reference_velocity"].astype(np.float64, copy=False)
     pace = np.hypot(v[..., 0], v[..., 1])
     moves = pace > 0.0
@@ -143,7 +143,7 @@ def _cross_track(samples: Fields, members: Members, place: str) -> np.ndarray:
 
 
 def _angle(samples: Fields, members: Members, attitude: str) -> np.ndarray:
-    """Angle (k, n) [rad] of the rotation from the wanted attitude to the actual one: 0 to pi."""
+    """Angle (k, n) [rad] of the rotation from the desired to the actual attitude: 0 to pi."""
     R, wanted = (samples[name].astype(np.float64, copy=False) for name in (attitude, "reference_attitude"))
     # By the distance of the matrices, 8 sin^2(angle / 2): exact near 0, where the trace is not.
     size = np.sqrt(((R - wanted) ** 2).sum(axis=(-2, -1)))
@@ -164,7 +164,7 @@ NEEDED |= {"position": "position", "attitude": "attitude", "cross_track": "posit
 
 @functools.cache
 def error(name: str, measured: bool) -> Quantity:
-    """Return the error of tracking as a quantity: wanted less actual."""
+    """Return the tracking error as a quantity: desired minus actual."""
     if name in _DISTANCES:
         unit, actual, wanted, function = _DISTANCES[name]
         actual = f"measured_{actual}" if measured else actual
@@ -181,14 +181,14 @@ def course(name: str, measured: bool) -> Quantity:
 
 
 def _of_channel(channel: Channel, function: Function, labels: tuple[str, ...]) -> Quantity:
-    """Return a function of a channel's actual and wanted number as a quantity."""
+    """Return a function of a channel's actual and desired number as a quantity."""
     fields = ordered((*channel.of_actual, channel.wanted))
     entries = ((channel.of_actual[0], channel.entries),) if channel.entries else ()
     return Quantity(channel.name, function, channel.unit, fields, labels, needs_limit=True, entries=entries)
 
 
 def tracked_name(key: str, of: Any, known: tuple[str, ...]) -> str:
-    """Return the name of what is tracked."""
+    """Return the name of the tracked number."""
     if isinstance(of, str) and of in known:
         return of
     why = "is a distance, which has no goal beyond" if among(of, _DISTANCES) else "is nothing that is tracked"
@@ -196,7 +196,7 @@ def tracked_name(key: str, of: Any, known: tuple[str, ...]) -> str:
 
 
 def check_wanted(faults: Faults, key: str, metrics: Mapping[str, Statistic], controller: Controller | None) -> None:
-    """Add a fault for each metric of what no guidance wants: its errors would be those from zero; or of a dock without one."""
+    """Add a fault for each metric without guidance, whose error would be the distance from 0, or without a dock."""
     docks = [part.key for part in controller.guidance if part.type == "docking"] if controller else []
     for name, metric in metrics.items():
         dock = getattr(metric, "docking", None)

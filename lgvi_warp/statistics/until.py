@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Stopping rule of a run: it ends when a statistic's interval is narrow enough."""
+"""Stopping rule of a run: the run ends when a statistic's interval is narrow enough."""
 
 from __future__ import annotations
 
@@ -31,24 +31,24 @@ def _time_or_all(faults: Faults, key: str, value: Any) -> Any:
 
 @dataclass(frozen=True)
 class Until:
-    """Run blocks of members until a statistic's interval is narrow enough, at most all members of the ensemble.
+    """Stopping rule: run blocks of members until a statistic's interval is narrow enough, at most all members.
 
-    The run stops at the end of a block. Intervals are checked in the order of the blocks, so that neither the number of
-    members nor any bit depends on threads; with replicates of a design, at powers of two of members.
-    docs/guide/statistics_accuracy.md gives the effect of stopping on coverage.
+    The run stops at the end of a block. Intervals are checked in the order of the blocks, so neither the number of
+    members nor any bit depends on threads. With replicates of a design, they are checked when the number of members is
+    a power of two. docs/guide/statistics_accuracy.md gives the effect of stopping on coverage.
 
     Args:
-        statistic: the name of one of the run's statistics as the command prints it: "mean position"; one component,
-            "mean position[2]"; one level, "quantiles depth 0.95" or "quantiles position[2] 0.95"; one entry of a
-            covariance, "covariance position[0], position[2]". A mean is gathered if it is not among the run's
-            statistics.
-        half_width: largest half width of the interval, in the statistic's unit, above 0. All components and levels of
-            the name must satisfy it.
-        at: sample time [s], by default the end; "all": every sample time.
-        members: least number of members, from 2; by default 1024 (a small sample may look narrower than it is).
+        statistic: name of one of the run's statistics, as the command prints it: "mean position"; of one component,
+            "mean position[2]"; of one level, "quantiles depth 0.95" or "quantiles position[2] 0.95"; or of one entry of
+            a covariance, "covariance position[0], position[2]". A mean that is not among the run's statistics is added.
+        half_width: largest allowed half width of the interval, in the statistic's unit, above 0. All components and
+            levels of the name must satisfy it.
+        at: sample time of the interval [s], by default the end; "all": every sample time.
+        members: minimum number of members, from 2; by default 1024, since the interval of a small sample may be too
+            narrow.
 
     Raises:
-        SceneError: with every fault.
+        SceneError: if arguments are faulty; the message lists all faults.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -87,8 +87,8 @@ def from_dict(table: Any) -> Until:
 class StoppingRule:
     """A stopping rule bound to the statistics of a run.
 
-    doubling: look at powers of two of members only, where a design of replicates is balanced: the spread of a few estimates
-        comes out small by chance too often for many looks.
+    doubling: True checks only at powers of two of members, at which a design of replicates is balanced. With more
+        checks, the spread of a few estimates would be small by chance too often.
     """
 
     until: Until
@@ -101,7 +101,7 @@ class StoppingRule:
     doubling: bool = False
 
     def due(self, members: int) -> bool:
-        """Return whether to look at the interval now, and note the look."""
+        """Return True if the interval is to be checked now, and record the check."""
         if members < self.until.members or members < self.looked * (1.0 + GROWTH):
             return False
         if self.doubling and members & (members - 1):
@@ -110,7 +110,7 @@ class StoppingRule:
         return True
 
     def reached(self, estimates: Sequence[Estimate]) -> bool:
-        """Return whether the watched intervals are narrow enough."""
+        """Return True if the watched intervals are narrow enough."""
         return self.widest(estimates) <= self.until.half_width
 
     def report(self, members: int, estimates: Sequence[Estimate]) -> str:
@@ -121,7 +121,7 @@ class StoppingRule:
         return f"{goal}: {word} with {members} members, {widest:.3g}"
 
     def widest(self, estimates: Sequence[Estimate]) -> float:
-        """Return the largest half width of the watched intervals; infinite where an interval is missing."""
+        """Return the largest half width of the watched intervals; infinite if an interval is missing."""
         estimate = next(candidate for candidate in estimates if candidate.name == self.name)
         half = estimate.half_width
         dims = estimate.dims["value"]
@@ -134,7 +134,7 @@ class StoppingRule:
 
 
 def watch(until: Until, statistics: Sequence[Statistic], times: np.ndarray) -> StoppingRule:
-    """Bind a stopping rule to the statistics of a run with sample times (k,) [s]; a mean that is not among them is added."""
+    """Bind a stopping rule to the statistics of a run with sample times (k,) [s]; a missing mean is added to them."""
     faults = Faults("until.")
     rows = np.array([len(times) - 1])
     if until.at == "all":
@@ -157,7 +157,7 @@ Named = tuple[Statistic, str, dict[str, int]]
 
 
 def _named(statistics: Sequence[Statistic]) -> dict[str, Named]:
-    """Names that can be watched: the statistic that gathers each, its estimate's name, its entry's index."""
+    """Names that can be watched -> the statistic, the name of its estimate, and the index of the entry."""
     pairs = [(outer, inner) for outer in statistics for inner in outer.parts()]
     names: dict[str, Named] = {inner.key: (outer, inner.key, {}) for outer, inner in pairs}
     for outer, inner in pairs:
@@ -186,7 +186,7 @@ def _names_of_entries(statistic: Statistic) -> dict[str, dict[str, int]]:
 
 
 def _target(name: str, known: Mapping[str, Named]) -> Named:
-    """Quantity that a name asks to watch: a known one, or a mean that is added to them."""
+    """Target that a name selects: a known one, or a mean that is added."""
     alike = (known[spelling] for spelling in known if canonical(spelling) == canonical(name))
     if (target := known.get(name) or next(alike, None)) is not None:
         return target

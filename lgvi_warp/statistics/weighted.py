@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Statistics of weighted members: sums under the weights w, and under their squares, from which the errors follow.
+"""Statistics of weighted members: sums under the weights w, and sums under their squares for the errors.
 
-A weighted estimate is a ratio of sums, such as m = sum w x / sum w. Its error is that of the linearised ratio,
-sum w^2 (x - m)^2 / (sum w)^2, which holds where weights and numbers depend on one another, as in importance sampling. The
-effective number n = (sum w)^2 / sum w^2 stands where the number of members does otherwise: in Student's t, in the correction
-n / (n - 1), and where an error cannot be seen: for probabilities of 0 and 1. With equal weights all of it is as without.
+A weighted estimate is a ratio of sums, such as m = sum w x / sum w. Its squared error is that of the linearised ratio,
+sum w^2 (x - m)^2 / (sum w)^2, which also holds if weights and numbers depend on each other, as in importance sampling.
+The effective number n = (sum w)^2 / sum w^2 replaces the number of members in Student's t, in the correction n / (n -
+1), and for probabilities of 0 and 1, which show no error. With equal weights all results are the same as without
+weights.
 """
 
 from __future__ import annotations
@@ -21,20 +22,20 @@ MEMBERS = "members_that_count"
 
 
 def is_weighted(part: Part) -> bool:
-    """Whether a part is of weighted members."""
+    """True if a part is of weighted members."""
     return MEMBERS in part
 
 
 def both_measures(own: Part, squares: Part, members: np.ndarray) -> Part:
-    """Return the part of weighted members: sums under the weights and under their squares, and how many count (k,)."""
+    """Return the part of weighted members: sums under the weights and under their squares, and numbers that count (k,)."""
     return own | {f"{SQUARE}{key}": array for key, array in squares.items()} | {MEMBERS: members}
 
 
 @dataclass(frozen=True)
 class Weighted:
-    """Content of a part of weighted members: its sums under the weights, and those under their squares.
+    """Content of a part of weighted members: its sums under the weights and under their squares.
 
-    own, squares: parts with "count", the sum (k,) of what members weigh. members: (k,), number of those that count.
+    own, squares: parts with "count", the sum (k,) of weights or squares. members: (k,), number of members that count.
     """
 
     own: Part
@@ -49,13 +50,13 @@ class Weighted:
 
     @property
     def weight(self) -> np.ndarray:
-        """Sum of the weights (k,); 1 where no member counts."""
+        """Sum of the weights (k,); 1 if no member counts."""
         total = self.own["count"]
         return np.where(total > 0.0, total, 1.0)
 
     @property
     def effective(self) -> np.ndarray:
-        """Effective number (k,) of members; 0 where none counts. docs/theory/estimators.md, (E15)."""
+        """Effective number (k,) of members; 0 if none counts. docs/theory/estimators.md, (E15)."""
         square = self.squares["count"]
         return np.where(square > 0.0, self.own["count"] ** 2 / np.where(square > 0.0, square, 1.0), 0.0)
 
@@ -89,7 +90,7 @@ class Weighted:
         return np.where(seen, p * (1.0 - p) / np.where(seen, variance, 1.0), n)
 
     def with_effective(self, estimate: Estimate) -> Estimate:
-        """Return the estimate with the effective number as its count, and the number of members beside it."""
+        """Return the estimate with the effective number as its count, and the number of members as a further array."""
         arrays = estimate.arrays | {"count": self.effective, "members": self.members}
         dims = estimate.dims | {"count": ("time",), "members": ("time",)}
         return replace(estimate, interval=f"{estimate.interval}, of weighted members", arrays=arrays, dims=dims)

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Uncertainty of ensembles (how sure): estimates, rare events, sensitivities, derivatives."""
+"""Uncertainty quantification of ensembles: estimates, rare events, sensitivities, derivatives."""

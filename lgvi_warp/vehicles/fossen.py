@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Vehicles from the usual forms of hydrodynamic coefficients, and the vehicles that come with the package.
 
-Every importer returns a plain dict in the scene file's form, {"vehicle": {...}, "environment": {...}, "terms": [...]},
-about the body origin, in body axes x ahead, y to starboard, z down, linear before angular. All faults come at once, as
-a SceneError.
+Every importer returns a dict in the form of the scene file, {"vehicle": {...}, "environment": {...}, "terms": [...]}. Its
+numbers are about the body origin, in body axes x ahead, y to starboard, z down, with linear before angular components. All
+faults are reported together, in one SceneError.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ def vehicle_names() -> list[str]:
 
 
 def _own_vehicles() -> dict[str, Path]:
-    """The files of the vehicles that no extension brings, by name."""
+    """The files of the vehicles of the core, without those of extensions, by name."""
     folder = Path(str(resources.files("lgvi_warp.vehicles")))
     return {path.stem: path for path in folder.glob("*.toml")}
 
@@ -79,13 +79,13 @@ def vehicle_tables(name: str) -> dict[str, Any]:
 class Coefficients:
     """Coefficients that an importer has read, before checks.
 
-    Drag is force_i = -(l_ij + q_ij |v_j|) v_j - u f_ij v_j, with u the speed ahead.
+    Drag is force_i = -(l_ij + q_ij |v_j|) v_j - u f_ij v_j, where u is the forward speed.
 
     mass [kg]; inertia (3, 3) [kg m2] about the centre of gravity; both centres (3,) [m] from the body origin; both forces [N].
-    added_mass: (6, 6) [kg, kg m, kg m2], positive; zero by default, as are drag and current.
+    added_mass: (6, 6) [kg, kg m, kg m2], positive. Added mass, drag and current are zero by default.
     linear: l (6, 6) [N s/m, N s, N m s]. quadratic, forward: q and f (6, 6) [N s2/m2, N s2/m, N s2, N m s2].
     current: Velocity (3,) [m/s] of the water, north, east, down.
-    gravity: Acceleration of free fall [m/s2] that the forces were found with. water_density: [kg/m3]. None if unknown.
+    gravity: Acceleration of free fall [m/s2] for which the forces hold. water_density: [kg/m3]. Both are None if unknown.
     """
 
     mass: float | None
@@ -131,7 +131,7 @@ class Coefficients:
         return tables
 
     def unstable(self) -> list[str]:
-        """Return a warning if the centre of gravity is above the centre of buoyancy: such a vehicle turns upside down."""
+        """Return a warning if the centre of gravity is above the centre of buoyancy, so that the vehicle would capsize."""
         assert self.center_of_gravity is not None
         assert self.center_of_buoyancy is not None
         above = float(self.center_of_buoyancy[2] - self.center_of_gravity[2])
@@ -141,7 +141,7 @@ class Coefficients:
         return [f"{problem}: the vehicle turns upside down; check both, and that z is down"]
 
     def terms(self) -> list[dict[str, Any]]:
-        """The terms that are not zero: "drag" of diagonal matrices, else "drag_matrix"; lift and current."""
+        """The nonzero terms: "drag" for diagonal matrices, else "drag_matrix"; lift and current."""
         terms: list[dict[str, Any]] = []
         pair = (self.linear, self.quadratic)
         if any(np.any(matrix) for matrix in pair):
@@ -168,7 +168,7 @@ def rigid_body_matrix(mass: float, inertia: np.ndarray, center: np.ndarray) -> n
 
 
 def symmetric(faults: Faults, key: str, matrix: np.ndarray) -> np.ndarray:
-    """Return the symmetric part of a matrix that is symmetric to the digits given."""
+    """Return the symmetric part of a matrix that is symmetric up to the rounding of its digits."""
     if np.abs(matrix - matrix.T).max() > RELATIVE * np.abs(matrix).max():
         remedy = "added mass of a body in unbounded water is symmetric: correct the pair"
         faults.add(key, matrix, "is not symmetric", remedy)
@@ -188,7 +188,7 @@ def rigid_body(
     """Check mass [kg], inertia (3,) or (3, 3) [kg m2] about the centre of gravity, centres (3,) [m] and forces [N] of a body.
 
     weight: None for mass times gravity. buoyancy: None for the weight.
-    Returns: The body without added mass and drag; None in place of what is wrong.
+    Returns: The body without added mass and drag; invalid values are None.
     """
     mass, gravity = faults.positive("mass", mass, "kg"), faults.number("gravity", gravity, "m/s2", least=0.0)
     inertia = faults.symmetric("inertia", inertia, "kg m2")
@@ -219,7 +219,7 @@ class Name:
 
 
 def read_name(name: str) -> Name | None:
-    """Meaning of the name of a hydrodynamic derivative, as usually spelt ("X_udot", "Xuu", "X_{u|u|}"); None for another."""
+    """Parse the name of a hydrodynamic derivative in a usual spelling ("X_udot", "Xuu", "X_{u|u|}"); None for others."""
     text = re.sub(r"[\s_{}\\$,()*]", "", str(name))
     if len(text) < 2 or text[0] not in FORCES:
         return None
@@ -256,14 +256,13 @@ def from_fossen(
 ) -> dict[str, Any]:
     """Build a vehicle and its drag from hydrodynamic derivatives in Fossen's (SNAME) names and signs.
 
-    Of a pair such as Y_rdot, N_vdot one suffices. These are refused:
+    It is enough to give one of a symmetric pair such as Y_rdot, N_vdot. These coefficients are refused:
 
-    * X_qq and the like, which are even in the velocity and so no drag;
-    * products (Y_uv, X_wq): those of the added mass follow from its matrix, those with u are a hull's lift, which
-      the term body_lift has, and the term quadratic_form has any;
-    * second-order moduli such as Y_|v|r (Fossen 2021, nonlinear damping), which are drag of the flow across the hull:
-      the force of speed and yaw rate together, for which a drag matrix has no place. The term cross_flow has that
-      force, found along the hull.
+    * X_qq and similar ones, which are even in the velocity and therefore are not drag;
+    * products (Y_uv, X_wq). Products of the added mass follow from its matrix. Products with u are a hull's lift: use the
+      term body_lift. The term quadratic_form accepts any product;
+    * second-order moduli such as Y_|v|r (Fossen 2021, nonlinear damping). They are cross-flow drag due to sway and yaw
+      together, which a drag matrix cannot represent. The term cross_flow computes this drag along the hull.
 
     Args:
         coefficients: Values by name: X_udot ... N_rdot [kg, kg m, kg m2], X_u ... N_r [N s/m, N m s],
@@ -272,7 +271,7 @@ def from_fossen(
         inertia: Inertia (3,) or (3, 3) [kg m2], about the point that `inertia_about` names.
         center_of_gravity: Position (3,) [m] from the body origin; by default the origin.
         center_of_buoyancy: Position (3,) [m] from the body origin; by default the origin.
-        inertia_about: "origin" of the body (default), or centre of "gravity".
+        inertia_about: Reference point of `inertia`: the body's "origin" (default), or the centre of "gravity".
         weight: Weight [N]; by default mass times gravity.
         buoyancy: Buoyancy [N]; by default the weight.
         gravity: Acceleration of free fall [m/s2]; by default 9.80665.
@@ -282,7 +281,7 @@ def from_fossen(
         The tables "vehicle", "environment" and "terms" of a scene file.
 
     Raises:
-        SceneError: If anything is wrong; the message lists every fault.
+        SceneError: If a coefficient or another argument is invalid; the message lists every fault.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -299,7 +298,7 @@ def from_fossen(
 
 
 def about_gravity(faults: Faults, body: Coefficients, inertia_about: str) -> None:
-    """Carry an inertia that is given about the body origin to the centre of gravity, in place."""
+    """Shift an inertia about the body origin to the centre of gravity, in place."""
     known = faults.choice("inertia_about", inertia_about, ("origin", "gravity"))
     if not known or inertia_about == "gravity" or body.mass is None or body.inertia is None:
         return
@@ -309,7 +308,7 @@ def about_gravity(faults: Faults, body: Coefficients, inertia_about: str) -> Non
 
 
 def add_derivatives(faults: Faults, body: Coefficients, values: Mapping[str, Any], ignore: Iterable[str] = ()) -> None:
-    """Put derivatives into the body's matrices of added mass and drag, which are minus their values."""
+    """Add derivatives to the body's matrices of added mass and drag, with the opposite sign."""
     if not isinstance(values, Mapping):
         faults.add("coefficients", values, "is not a map of names", 'write {"X_udot": -30.0, "X_u": -4.0, ...}')
         values = {}
@@ -336,7 +335,7 @@ def add_derivatives(faults: Faults, body: Coefficients, values: Mapping[str, Any
 
 
 def refuse_name(faults: Faults, key: str, value: Any, name: Name | None) -> None:
-    """Note why a coefficient cannot be taken; its name is None if it is not a coefficient's."""
+    """Add a fault with the reason why a coefficient is refused; `name` is None if it is not a coefficient's name."""
     if name is None:
         faults.add(key, value, "is not a coefficient's name", f"known: {_NAMES}")
     elif name.kind == "even":
@@ -358,7 +357,7 @@ def refuse_name(faults: Faults, key: str, value: Any, name: Name | None) -> None
 
 
 def refuse_sign(faults: Faults, key: str, number: float, name: Name) -> None:
-    """Note a diagonal derivative above zero, which would be negative added mass, or drag that drives."""
+    """Add a fault for a positive diagonal derivative, which would be negative added mass or negative drag."""
     if name.row == name.columns[0] and number > 0.0:
         problem = "is positive; the sign convention is Fossen's, in which this derivative is negative"
         faults.add(key, number, problem, f"write {-number:g} if it is meant as added mass or drag")
@@ -367,7 +366,7 @@ def refuse_sign(faults: Faults, key: str, number: float, name: Name) -> None:
 def with_partners(
     faults: Faults, matrix: np.ndarray, keys: Mapping[tuple[str, int, int], str], coefficients: Mapping[str, Any]
 ) -> np.ndarray:
-    """Added mass (6, 6) with the missing one of each pair of entries filled in; pairs that differ are noted."""
+    """Added mass (6, 6), completed by symmetry; adds a fault for a pair of entries that differ."""
     full = matrix.copy()
     for row, column in combinations(range(6), 2):
         upper, lower = keys.get(("dot", row, column)), keys.get(("dot", column, row))
@@ -404,19 +403,19 @@ PAIRS = ("xx", "xy", "xz", "yy", "yz", "zz")
 
 
 def inertia_from_names(named: Mapping[str, Any]) -> np.ndarray:
-    """An inertia matrix (3, 3) [kg m2] of ixx, ixy, ixz, iyy, iyz, izz; 0 where one is missing."""
+    """Inertia matrix (3, 3) [kg m2] from ixx, ixy, ixz, iyy, iyz, izz; missing entries are 0."""
     xx, xy, xz, yy, yz, zz = (named.get(f"i{pair}", 0.0) for pair in PAIRS)
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
 def turned(value: Any, axes: np.ndarray) -> Any:
-    """Turn a vector (3,) by the sign of each axis; anything else is returned as it is, to be refused by a later check."""
+    """Multiply a vector (3,) by the sign of each axis; any other value is returned unchanged, for a later check."""
     checked = Faults().finite("", value, (3,))
     return value if checked is None else axes * checked
 
 
 def read_text(source: str | os.PathLike[str], is_text: bool, format_name: str) -> str:
-    """Return a text, or the content of the file that it names."""
+    """Return `source` itself if it is a text, or else the content of the file that it names."""
     if is_text:
         text = str(source)
         if len(text) > (most := MOST_BYTES.get(format_name, MOST_OTHERS)):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The members of a stability map: what varies along its two axes, and the state and parameters of every cell."""
+"""Members of a stability map: the quantities along its two axes, and the state and parameters of every cell."""
 
 from __future__ import annotations
 
@@ -41,14 +41,14 @@ class Axis:
     """Quantity along an axis of a map, from a low to a high value.
 
     Attributes:
-        name: "h" [s]; "angular_velocity" [rad/s] or "speed" [m/s]: size of the start's, direction kept;
-            "added_mass_ratio": largest added mass over the mass [1]; "drag_number": largest (l + 2 q |v|) / I of the start
-            [1/s], which times h is the drag number; or a name of scene.parameters().
-        low: lowest value; None for one that fits the scene.
-        high: highest value; None for one that fits the scene.
-        log: whether values rise by equal factors, else by equal steps. Default True.
-        scaled: whether a parameter is multiplied by the value, or set to it. Default None: numbers are set, vectors and
-            matrices multiplied.
+        name: "h": step [s]; "angular_velocity" [rad/s] or "speed" [m/s]: magnitude at the start (the direction is kept);
+            "added_mass_ratio": largest added mass divided by the mass [1]; "drag_number": largest damping rate (l + 2 q
+            |v|) / I at the start [1/s] (h times this rate is the drag number); or a name of scene.parameters().
+        low: lowest value; None derives it from the scene.
+        high: highest value; None derives it from the scene.
+        log: True for values with equal ratios, False for equal differences. Default True.
+        scaled: True multiplies the parameter by the value, False sets it to the value. Default None: numbers are set;
+            vectors and matrices are multiplied.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -70,10 +70,10 @@ class Axis:
             text: "NAME", "NAME=LOW:HIGH" or "NAME=LOW:HIGH:linear", with ":scale" or ":set" at the end for parameters.
 
         Returns:
-            The axis; what the text leaves out has its default.
+            The axis; parts that the text leaves out have their defaults.
 
         Raises:
-            SceneError: if the text is of another form.
+            SceneError: if the text has another form.
         """
         name, equals, rest = str(text).partition("=")
         faults, words = Faults(), rest.split(":") if equals else []
@@ -99,10 +99,10 @@ class Axis:
         return ALIASES.get(self.name, self.name)
 
     def values(self, points: int) -> np.ndarray:
-        """List the values along the axis, whose range must be known.
+        """List the values along the axis. Both ends of its range must be given.
 
         Args:
-            points: how many.
+            points: number of values.
 
         Returns:
             Values from low to high (points,), in the unit of the axis.
@@ -118,10 +118,10 @@ class Line:
     """Axis of a finished map.
 
     Attributes:
-        name: its name, without aliases.
+        name: name of the quantity, with aliases replaced.
         label: text for a figure.
         unit: unit of the values.
-        log: whether it is drawn in equal factors.
+        log: True if a figure draws the axis on a logarithmic scale.
         values: the values (k,) [unit].
     """
 
@@ -135,7 +135,7 @@ class Line:
         """Convert the axis to plain types for JSON.
 
         Returns:
-            Its fields; the values as a list.
+            Fields of the axis, with the values as a list.
         """
         return vars(self) | {"values": self.values.tolist()}
 
@@ -153,7 +153,7 @@ class Line:
 
 
 def axis_of(axis: Any) -> Axis:
-    """The axis that a user describes: an Axis, a text for Axis.parse, or (name, low, high)."""
+    """Axis from a user's description: an Axis, a text for Axis.parse, or (name, low, high)."""
     if isinstance(axis, Axis):
         return axis
     items = items_of(axis) or ()
@@ -165,13 +165,13 @@ def axis_of(axis: Any) -> Axis:
 class StabilityGrid:
     """Every cell of a map of two axes, with several starts in each.
 
-    Members are numbered (y, x, direction), the last fastest. The first direction is the scene's own start; the others are
-    turned at random. What the scene's ensemble varies is left out.
+    Members are numbered (y, x, direction); the direction changes fastest. The first direction is the scene's own start;
+    the others are turned at random. The scene's [ensemble] is ignored.
 
     points: number of cells (nx, ny).
     base: the scene's start as one member.
-    rate: fastest motion at the scene's start [rad/s].
-    step: where it is on no axis; by default run.step of the scene [s].
+    rate: angular rate of the fastest motion at the scene's start [rad/s].
+    step: the step if no axis varies it; by default run.step of the scene [s].
     shape: (ny, nx, directions).
     state: position, attitude, velocity and angular velocity of every member (n, ...).
     varied: name -> values of the parameters that differ between members (n, ...).
@@ -211,13 +211,13 @@ class StabilityGrid:
         self._build(np.random.default_rng(seed))
 
     def _rate(self) -> float:
-        """The fastest of spin, Munk and restoring oscillation at the scene's start [rad/s]; 1 if all rest."""
+        """Largest rate of spin, Munk and restoring oscillation at the scene's start [rad/s]; 1 if all are zero."""
         m = self.base
         rates = member_rates.rates(m.parameters, m.velocity, m.angular_velocity)
         return float(max(rates[name][0] for name in ("rotation", "munk", "restoring"))) or 1.0
 
     def _ranged(self, faults: Faults, axis: Axis) -> Axis:
-        """Complete the range of an axis; add to the faults what is wrong with it."""
+        """Complete the range of an axis; add errors in it to the faults."""
         known = [*SPECIAL, *self.base.parameters]
         if axis.key not in known:
             faults.add("axis", axis.name, "is not a parameter of the scene", closest(axis.name, known))
@@ -243,7 +243,7 @@ class StabilityGrid:
         return replace(axis, low=float(low), high=float(high))
 
     def _default(self, axis: Axis) -> tuple[Any, Any]:
-        """A range of an axis that fits the scene."""
+        """Default range of an axis, derived from the scene."""
         w, m = self.rate, self.base
         speed = float(np.linalg.norm(m.velocity)) or 1.0
         known = {
@@ -267,7 +267,7 @@ class StabilityGrid:
         return bool(self.base.parameters[axis.key][0].ndim) if axis.scaled is None else axis.scaled
 
     def line(self, axis: Axis, values: np.ndarray) -> Line:
-        """An axis as a finished map has it."""
+        """Convert an axis and its values to an axis of a finished map."""
         if axis.key in SPECIAL:
             unit, label = SPECIAL[axis.key]
         elif self.scaled(axis):
@@ -343,12 +343,12 @@ class StabilityGrid:
             self.varied[key] = (values * mass)[:, None, None] * np.diag(([0.0, 1.0, 1.0, 0.0, 0.0, 0.0])[:size])
 
     def parameters(self, members: np.ndarray) -> dict[str, np.ndarray]:
-        """All parameters of some members: name -> values with leading dimension k, or 1 where members share them."""
+        """All parameters of some members: name -> values with leading dimension k, or 1 if all members share them."""
         return {name: self.varied[name][members] if name in self.varied else value
                 for name, value in self.base.parameters.items()}  # fmt: skip
 
     def fleet(self, members: np.ndarray) -> Ensemble:
-        """An ensemble of some members."""
+        """Build an ensemble of some members."""
         b, R, nu, Om = (self.state[name][members] for name in FIELDS)
         varied = {name: value[members] for name, value in self.varied.items()}
         return Ensemble.from_states(self.scene, b, R, nu, Om, varied)
@@ -359,7 +359,7 @@ class StabilityGrid:
         return member_rates.rates(self.parameters(every), self.state["velocity"], self.state["angular_velocity"])
 
     def columns(self) -> list[tuple[float, np.ndarray]]:
-        """Each step [s], the shortest first, and the indices of the members that take it."""
+        """List each step [s], the shortest first, and the indices of the members that use it."""
         steps, step_index = np.unique(self.h, return_inverse=True)
         return [(float(h), np.flatnonzero(step_index == i)) for i, h in enumerate(steps)]
 
@@ -375,7 +375,7 @@ def rotation_vectors(rng: np.random.Generator, n: int) -> np.ndarray:
 
 
 def _prepared(scene: Scene, names: Sequence[str]) -> Scene:
-    """The scene without its ensemble; with drag on every axis where the map varies drag and there is none."""
+    """The scene without its ensemble. If the map varies drag and the scene has none, drag on every axis is added."""
     terms = list(scene.terms)
     parameters = {key: np.asarray(value)[None] for key, value in scene.parameters().items()}
     if "drag_number" in names and not member_rates.drag_keys(parameters):

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Largest stable steps: what linear theory says of a method.
+"""Largest stable steps of each method by linear theory.
 
-A limit is a number c of a method over a rate of a member (lgvi_warp.physics.rates), h < c / rate.
+The limit of the step is h < c / rate, with a number c of the method and a rate of the member (lgvi_warp.physics.rates).
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ MOMENTS = {"munk": ("T", "Ap", "B"), "restoring": ("K", "B")}
 
 
 def _oscillator(method: Method, moments: tuple[str, ...]) -> list[tuple[bool, float]]:
-    """The moves of one step in turn: (whether the angle or the rate is advanced, over how many steps)."""
+    """The sub-maps of one step in order: (True if the angle is advanced, False for the rate; its length in steps)."""
     if method.two_part:
         first = method.program[0][0]
         return [((first == "A") == (i % 2 == 0), g) for i, g in enumerate(method.stages)]
@@ -41,8 +41,8 @@ def _oscillator(method: Method, moments: tuple[str, ...]) -> list[tuple[bool, fl
 def oscillation_limit(name: str, kind: str = "munk") -> float:
     """The largest h w [rad] at which a small oscillation of frequency w stays small; NaN for gauss*.
 
-    For sub-maps it follows from the product of shears that a step is, for explicit methods from the stability polynomial
-    at i h w. Large amplitudes may tumble earlier.
+    A step of a method with sub-maps is a product of shears, whose trace gives the limit. For explicit methods the limit
+    follows from the stability polynomial at i h w. Large amplitudes may tumble at shorter steps.
     """
     method, numbers = Method(name), np.arange(STEP, MOST, STEP)
     if method.gauss:
@@ -62,8 +62,7 @@ def oscillation_limit(name: str, kind: str = "munk") -> float:
 def rotation_limit(name: str) -> float:
     """The largest h |J^-1 pi| of a method [rad]; NaN for gauss*.
 
-    It is |J^-1 a| = 1 for equation (24), half an angle of 1 for turns about axes, and for rk* the step at which the
-    numbers of R grow.
+    The limit is |J^-1 a| = 1 for equation (24), a half angle of 1 for turns about axes; for rk* it is where R grows.
     """
     method = Method(name)
     if method.tableau:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Regions in which a method holds: maps of accurate, bounded, flagged, failed and silently wrong runs over two parameters."""
+"""Stability maps of each method: accurate, bounded, flagged, failed and silently wrong runs over two parameters."""
 
 from __future__ import annotations
 
@@ -55,10 +55,10 @@ class Cell(IntEnum):
 
     Attributes:
         ACCURATE: the error is below its bound.
-        BOUNDED: the error is not; energy and rotation are bounded.
+        BOUNDED: the error exceeds its bound; energy and rotation are bounded.
         FLAGGED: bounded, with a status or a warning.
         FAILED: unbounded or not finite, with a status or a warning.
-        SILENT: unbounded without any.
+        SILENT: unbounded, without a status or a warning.
     """
 
     ACCURATE = 0
@@ -69,7 +69,7 @@ class Cell(IntEnum):
 
     @property
     def text(self) -> str:
-        """Meaning of the class in a few words."""
+        """Short text that explains the class."""
         return TEXTS[self]
 
 
@@ -89,27 +89,27 @@ class StabilityMap(Saved):
     """Classes of cells over two axes, for each method.
 
     Attributes:
-        x: horizontal axis, of nx values.
-        y: vertical axis, of ny values.
+        x: horizontal axis, with nx values.
+        y: vertical axis, with ny values.
         classes: method -> Cell codes (ny, nx).
-        errors: method -> largest error up to error_time (ny, nx) [unit]; infinite where there is none.
-        energies: method -> largest growth of energy over energy_bound (ny, nx) [1]; unbounded above 1.
-        statuses: method -> worst Status code (ny, nx); 255 where the program refused to run the cell.
-        ratios: method -> limit -> step h over the analytic limit of the fastest start (ny, nx) [1]; above 1 beyond it. The
-            limits are those of accuracy.stability.limits.LIMITS.
-        of: name of the quantity that errors are of.
+        errors: method -> largest error up to error_time (ny, nx) [unit]; infinite if it could not be measured.
+        energies: method -> largest growth of energy divided by energy_bound (ny, nx) [1]; unbounded above 1.
+        statuses: method -> worst Status code (ny, nx); 255 if the program refused to run the cell.
+        ratios: method -> limit -> step h divided by the analytic step limit of the fastest start (ny, nx) [1]; above 1
+            the step exceeds the limit. The names of the limits are in accuracy.stability.limits.LIMITS.
+        of: name of the quantity whose error is measured.
         error_bound: largest error of an accurate cell [unit].
         error_time: time up to which errors count, rounded up to whole steps [s].
         t1: time up to which energy counts, rounded up to whole steps [s].
         directions: number of starts of each cell.
-        judged: how energies are judged: "conservative", "dissipative" or "driven".
-        reference: what errors are measured against, in words.
-        unverified: number of cells whose reference is not good enough; none of them can be accurate.
+        judged: criterion for the energies: "conservative", "dissipative" or "driven".
+        reference: description of the reference of the errors.
+        unverified: number of cells whose reference is not accurate enough; they cannot be classified as accurate.
         provenance: scene, settings, versions and machine.
-        refused: method -> why the scene does not take it.
+        refused: method -> reason why it cannot run the scene.
         messages: notes for the user.
-        seconds: time that the map took [s].
-        unit: unit of the errors. Default: that of `of`.
+        seconds: time in which the map was computed [s].
+        unit: unit of the errors. Default: the unit of `of`.
     """
 
     x: Line
@@ -169,15 +169,15 @@ class StabilityMap(Saved):
         return tuple(self.classes)
 
     def limit(self, method: str, worst: Cell = Cell.BOUNDED) -> np.ndarray:
-        """Measure the limit of x in each row: the largest x up to which all cells are at most this class.
+        """Find the limit of x in each row: the largest x up to which no cell has a class worse than `worst`.
 
         Args:
             method: name of a method of the map.
-            worst: worst class still within the limit. Default: Cell.BOUNDED.
+            worst: worst class that is accepted. Default: Cell.BOUNDED.
 
         Returns:
-            Limit for each y (ny,) [x.unit]; NaN where the first cell is worse. The last x means that the limit lies beyond
-            the map.
+            Limit for each y (ny,) [x.unit]; NaN if already the first cell is worse. If the limit is the last x, the
+            true limit may lie beyond the map.
 
         Raises:
             SceneError: for a method that the map does not have.
@@ -200,7 +200,7 @@ class StabilityMap(Saved):
         return {cell.name.lower(): int(np.sum(self._of(method) == cell)) for cell in Cell}
 
     def silent(self, method: str) -> list[tuple[float, float]]:
-        """List the cells whose energy is unbounded without any flag: what must never happen.
+        """List the silent cells: their energy is unbounded, but no status or warning reports it. There should be none.
 
         Args:
             method: name of a method of the map.
@@ -267,7 +267,7 @@ def _array(values: Any, kind: Any) -> np.ndarray:
 
 
 def status_name(code: int) -> str:
-    """A status code of the map as a word."""
+    """Name of a status code of the map."""
     return "refused" if code == REFUSED else Status(code).name.lower()
 
 
@@ -291,50 +291,48 @@ def stability_map(
     threads: int | None = None,
     progress: Callable[[float], None] | bool | None = None,
 ) -> StabilityMap:
-    """Run a grid of starts by every method, and classify each cell as accurate, bounded, flagged, failed or silent.
+    """Run each method from a grid of starts, and classify each cell as accurate, bounded, flagged, failed or silent.
 
     Classes of a cell:
 
-    * accurate: the error stays below the bound up to error_time, against a reference of fine steps on which two runs agree
-      ten times better;
+    * accurate: the error stays below the bound up to error_time, against two fine runs that agree ten times better;
     * bounded: not accurate, but energy and rotation stay bounded up to t1;
     * flagged: bounded, and a member got a status or a warning;
-    * failed: unbounded, and a member got a status or a warning; or numbers are not finite;
+    * failed: unbounded, and a member got a status or a warning; or some numbers are not finite;
     * silent: unbounded, and no member got a status or a warning.
 
     Energy is bounded if its change (conservative scene) or its growth (damped scene) is less than energy_bound times the sum
-    of the kinetic energy that the start's momenta can hold and the energy that the potentials gave. Wrenches, thrusters and
-    waves change the energy of a scene: there it is compared with the reference's, up to error_time or 16 steps. The scene's
-    [ensemble] is ignored.
+    of the kinetic energy that the start's momenta allow and the energy that the potentials have supplied. Wrenches,
+    thrusters and waves change the energy: for such scenes it is compared with the energy of the reference, up to
+    error_time or 16 steps. The scene's [ensemble] is ignored.
 
     Args:
         scene: the scene.
         x: horizontal axis: "h", "angular_velocity", "speed", "added_mass_ratio", "drag_number" or a name of
             scene.parameters(); as a text ("h=0.01:3", "vehicle.mass=50:500:linear"), as (name, low, high), or as a
             lw.studies.Axis. Default "h".
-        y: vertical axis, in the same forms. Default "angular_velocity".
-        methods: names. Default: psi, psi_s, psi_x and rk4.
-        points: number of cells along x and y, one number or two. Default 24.
+        y: vertical axis, given in the same forms as x. Default "angular_velocity".
+        methods: names of the methods. Default: psi, psi_s, psi_x and rk4.
+        points: number of cells along both axes, or two numbers for x and y. Default 24.
         t1: time up to which energy counts [s]. Default: ten periods of the fastest motion at the start.
-        error: largest error of an accurate cell, in the unit of `of`; above 0. Default 1e-2.
-        of: quantity that errors are of: any that statistics know ("attitude", "position", "depth", "euler[1]", ...), or a
-            lw.statistics.Quantity. Default "attitude" [rad].
+        error: error bound of an accurate cell, in the unit of `of`; above 0. Default 1e-2.
+        of: quantity whose error is measured: a name that statistics accept ("attitude", "position", "depth",
+            "euler[1]", ...), or a lw.statistics.Quantity. Default "attitude" [rad].
         error_time: time up to which errors count [s]. Default: one period of the fastest motion at the start.
         energy_bound: largest growth of energy of a bounded cell [1]. Default 1.
-        directions: number of starts of each cell: the scene's own, and others with velocity and spin turned at random; the
-            worst counts. Default 4.
-        h: the step, where it is on no axis [s]. Default: run.step of the scene.
-        dtype: precision. Default: that of the scene.
-        seed: of the random turns. Default 0.
-        threads: number of threads. Default: those of this machine.
-        progress: True shows a bar or lines, as in lw.solve; a function is called with the fraction of the work that is done,
-            from 0 to 1.
+        directions: number of starts of each cell: the scene's own, and others with velocity and spin turned at random;
+            the worst start decides the class. Default 4.
+        h: step [s], if no axis varies it. Default: run.step of the scene.
+        dtype: precision. Default: the scene's precision.
+        seed: seed of the random turns. Default 0.
+        threads: number of threads. Default: all threads of this machine.
+        progress: True shows a bar or lines, as in lw.solve; a function is called with the completed fraction, from 0 to 1.
 
     Returns:
         The map.
 
     Raises:
-        SceneError: for faulty arguments, all in one message; where the scene takes none of the methods; and where noise acts.
+        SceneError: if arguments are faulty (one message lists all), if no method can run the scene, or if noise acts.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -446,7 +444,7 @@ def _worst(grid: StabilityGrid, values: np.ndarray) -> np.ndarray:
 
 
 def worst_status(grid: StabilityGrid, status: np.ndarray) -> np.ndarray:
-    """The worst status over the starts of each cell (ny, nx): refusals by the program, then failures, events and OK."""
+    """The worst status over the starts of each cell (ny, nx). From worst to best: refused, failed, event, OK."""
     rank = np.where(stopped(status), status - 500, np.where(status == Status.OK, -1000, status)).reshape(grid.shape)
     chosen = np.argmax(rank, axis=2)[:, :, None]
     return np.take_along_axis(status.reshape(grid.shape), chosen, axis=2)[:, :, 0]
@@ -461,9 +459,9 @@ def cells_of(runs: CellRuns, verified: np.ndarray, error: float, energy_bound: f
 
 
 def _ratios(grid: StabilityGrid, methods: Sequence[str]) -> dict[str, dict[str, np.ndarray]]:
-    """Method -> limit -> the step over it, of the fastest start of each cell (ny, nx) [1].
+    """Method -> limit -> the step divided by the limit, for the fastest start of each cell (ny, nx) [1].
 
-    Limits that a method does not have, or whose motion is absent, are left out.
+    Limits that a method does not have, and limits of motions that do not occur, are left out.
     """
     numbers = {name: _worst(grid, grid.h * rate) for name, rate in grid.rates().items()}
     ratios: dict[str, dict[str, np.ndarray]] = {}
@@ -485,7 +483,7 @@ def _provenance(
 
 
 def report_lines(stability: StabilityMap) -> list[str]:
-    """The map as lines of text."""
+    """Report of the map as lines of text."""
     unit = stability.unit
     lines = [f"note        {message}" for message in stability.messages]
     lines += [

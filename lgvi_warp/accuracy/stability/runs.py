@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Runs behind a stability map: references, every method's runs, and the errors and energies that they show."""
+"""Runs of a stability map: references, every method's runs, and their errors and energies."""
 
 from __future__ import annotations
 
@@ -46,9 +46,9 @@ SHORTEST = TimeGrid(1e-9, np.array([0, 1]), np.array([0.0, 1e-9]))
 class CellRuns:
     """Outcomes of a method's runs, per member (n,).
 
-    error: largest error up to the error time [unit of the quantity]; infinite where there is none.
-    growth: largest growth of energy over the energy available [1].
-    status: Status codes; REFUSED where the program refused to run the member.
+    error: largest error up to the error time [unit of the quantity]; infinite if it could not be measured.
+    growth: largest growth of energy divided by the energy available [1].
+    status: Status codes; REFUSED if the program refused to run the member.
     """
 
     error: np.ndarray
@@ -61,8 +61,8 @@ class CellRuns:
 class Column:
     """One step h [s], the members that take it (k,), and their reference.
 
-    error_steps, steps: numbers of the steps at which errors are measured, and energies, those of errors included.
-    verified: whether each member's reference is good enough (k,).
+    error_steps: numbers of the steps at which errors are measured. steps: the same for energies, including error_steps.
+    verified: True for each member whose reference is accurate enough (k,).
     """
 
     h: float
@@ -73,7 +73,7 @@ class Column:
     verified: np.ndarray = field(default_factory=lambda: np.zeros(0, bool))
 
     def grid(self, finer: int = 1, to_the_end: bool = True) -> TimeGrid:
-        """The steps and sample times of a run, whose steps are shorter by a whole number."""
+        """Steps and sample times of a run with steps of h / finer."""
         steps = self.steps if to_the_end else self.error_steps
         return TimeGrid(self.h / finer, steps * finer, steps * self.h)
 
@@ -94,7 +94,7 @@ def plan_of(
 
 
 def refusals(grid: StabilityGrid, names: Sequence[str], dtype: str) -> dict[str, str]:
-    """The methods that the scene does not take at any step, and why."""
+    """Methods that cannot run the scene at any step, and the reasons."""
     refused = {}
     for name in names:
         try:
@@ -105,7 +105,7 @@ def refusals(grid: StabilityGrid, names: Sequence[str], dtype: str) -> dict[str,
 
 
 def judged(grid: StabilityGrid, names: Sequence[str]) -> str:
-    """Judgement of energies: "conservative" where kept, "dissipative" where lost, "driven" where a force may supply them."""
+    """Criterion for energies: "conservative" (kept), "dissipative" (lost) or "driven" (a force may supply energy)."""
     laws = plan_of(grid, np.arange(1), names[0], SHORTEST, "float64").kernel_choice.laws
     if any(getattr(module, "NOISE", False) for _, module in laws):
         raise SceneError(["terms: noise acts, whose path differs from step to step. Leave it out for a stability map"])
@@ -122,7 +122,7 @@ def judged(grid: StabilityGrid, names: Sequence[str]) -> str:
 
 
 def _carried(term: Any, module: Any) -> bool:
-    """True if a steady current supplies no energy through a law: if it is level and the law is weight, buoyancy or drag."""
+    """True if a steady current supplies no energy through a law: a level current with weight, buoyancy or drag."""
     if getattr(module, "FLOW", "none") == "steady":
         return not np.any(np.asarray(term.velocity)[2:])
     return getattr(module, "SEPARABLE", False) or not hasattr(module, "law")
@@ -132,7 +132,7 @@ def make_references(
     grid: StabilityGrid, columns: Sequence[Column], of: Any, error: float, threads: int, report: Callable[[float], None],
     *, run: Callable[..., Result] = run_plan,
 ) -> str:  # fmt: skip
-    """Give every column its reference at the error times, which is better than the error by TRUST."""
+    """Compute every column's reference at the error times; its error is below `error` by the factor TRUST."""
     compared = compared_in(of)
     first, second = precise_pair(grid)
     rates = np.max(list(grid.rates().values()), axis=0)
@@ -150,7 +150,7 @@ def make_references(
 
 
 def precise_pair(grid: StabilityGrid, *, refused: Callable[..., dict[str, str]] = refusals) -> tuple[str, str]:
-    """The two best methods that the scene takes."""
+    """Names of the two most accurate methods that can run the scene."""
     names = list(itertools.islice((name for name in PRECISE if not refused(grid, [name], "float64")), 2))
     if not names:
         raise SceneError([f"method: the scene takes none of {', '.join(PRECISE)} for a reference"])
@@ -161,7 +161,7 @@ def _reference(
     grid: StabilityGrid, column: Column, names: tuple[str, str], rates: np.ndarray, of: Distance, goal: float,
     run: Callable[..., Result],
 ) -> None:  # fmt: skip
-    """Fill in a column's reference by two methods, halving the steps of members that do not agree yet."""
+    """Compute a column's reference by two methods; halve the steps of members on which they do not agree yet."""
     n = len(column.members)
     column.verified = np.zeros(n, bool)
     open_ = np.arange(n)
@@ -206,7 +206,7 @@ def run_method(
 ) -> tuple[CellRuns, str]:  # fmt: skip
     """Run a method over all columns.
 
-    Returns: What the runs showed, and why the program refused some of them; "" where it refused none.
+    Returns: Outcomes of the runs, and the reason why the program refused some of them; "" if it refused none.
     """
     n = len(grid.h)
     findings = CellRuns(np.full(n, np.inf), np.zeros(n), np.full(n, REFUSED), np.zeros(n, bool))
@@ -237,7 +237,7 @@ def run_method(
 
 
 def judge(result: Result, column: Column, at: np.ndarray, runs: CellRuns, of: Distance, judged: str) -> None:
-    """Write down the errors, energies, statuses and warnings of a run of some members of a column."""
+    """Record the errors, energies, statuses and warnings of a run of some members of a column."""
     members = column.members[at]
     runs.status[members] = np.asarray(result.status)
     warnings = getattr(result, "warnings", None)
@@ -267,7 +267,7 @@ def _at_times(result: Result, rows: np.ndarray) -> Result:
 
 
 def _with_rotation(growth: np.ndarray, result: Result) -> np.ndarray:
-    """The larger of the growth of energy and the distance of R from a rotation over SKEWED (n,); infinite where not finite."""
+    """Larger of energy growth and R's distance from a rotation, divided by SKEWED (n,); infinite if not finite."""
     R = result.attitude.astype(np.float64)
     skewed = np.abs(np.swapaxes(R, -1, -2) @ R - np.eye(3)).max(axis=(0, 2, 3)) / SKEWED
     worst = np.maximum(growth, skewed)

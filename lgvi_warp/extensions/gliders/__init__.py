@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Underwater gliders: what moves and weighs in them, their polars, and water and hulls by whose density they dive."""
+"""Underwater gliders: moving masses, ballast, polars, compressible hulls, and water whose density varies with depth."""
 
 # Where the device code of the terms is.
 DEVICE = f"{__name__}.device"

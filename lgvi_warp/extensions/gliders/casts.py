@@ -37,7 +37,7 @@ NOT_MEASURED = ("qc", "flag", "flags", "std", "sd", "error", "err", "anomaly")
 
 
 def profile_of(file: Any, columns: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
-    """Rising depths (k,) [m] and densities (k,) [kg/m3] of a cast: a file, columns, or columns in place of those of a file."""
+    """Rising depths (k,) [m] and densities (k,) [kg/m3] of a cast, from a file or columns; columns override the file's."""
     faults = Faults()
     faults.keys("", columns, (*WORDS, *PLACE))
     faults.raise_if_any()
@@ -60,7 +60,7 @@ def profile_of(file: Any, columns: Mapping[str, Any]) -> tuple[np.ndarray, np.nd
 
 
 def _measured(name: str, array: np.ndarray, faults: Faults) -> np.ndarray:
-    """The numbers of a column, nan for marks of what is missing; a fault where one cannot be of the sea, in this unit."""
+    """The numbers of a column, with nan for missing values. Adds a fault for a value that sea water cannot have."""
     array = np.where((np.abs(array) < MARK) & (array != 0.0), np.nan, array)
     least, most, unit = BOUNDS[name]
     odd = array[np.isfinite(array) & ((array < least) | (array > most))]
@@ -73,7 +73,7 @@ def _measured(name: str, array: np.ndarray, faults: Faults) -> np.ndarray:
 
 
 def _computed(numbers: Mapping[str, np.ndarray], latitude: float, longitude: float) -> tuple[np.ndarray, np.ndarray]:
-    """Depths and densities; TEOS-10 where one of them is not numbers."""
+    """Depths and densities, by TEOS-10 if either of them is not given."""
     if {"depth", "density"} <= numbers.keys():
         return numbers["depth"], numbers["density"]
     try:
@@ -92,7 +92,7 @@ def _computed(numbers: Mapping[str, np.ndarray], latitude: float, longitude: flo
 
 
 def _sorted(depth: np.ndarray, density: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Rising depths, without lines that lack a number; of a depth that occurs twice the mean, as of a cast down and up."""
+    """Rising depths and their densities, without incomplete rows. Densities at the same depth, down and up, are averaged."""
     good = np.isfinite(depth) & np.isfinite(density)
     if not good.any():
         raise SceneError(["cast has no line with both a depth and a density. Look at its columns."])
@@ -101,7 +101,7 @@ def _sorted(depth: np.ndarray, density: np.ndarray) -> tuple[np.ndarray, np.ndar
 
 
 def _of_file(path: Path) -> dict[str, Any]:
-    """Columns of a file that have a known name."""
+    """The columns of a file whose names are known."""
     if not path.is_file():
         raise refusal("file", str(path), "is no file", "give the path of a CSV or NetCDF file")
     return _of_netcdf(path) if path.suffix.lower() in (".nc", ".nc4", ".cdf") else _of_csv(path)
@@ -124,7 +124,7 @@ def _of_csv(path: Path) -> dict[str, Any]:
 
 
 def _dialect(head: list[str]) -> type[csv.Dialect]:
-    """Commas, semicolons, tabs or spaces, by the line of names."""
+    """CSV dialect with the separator of the line of names: semicolon, tab, comma or space."""
     text = head[0] if head else ""
 
     class Dialect(csv.excel):
@@ -150,7 +150,7 @@ def _of_netcdf(path: Path) -> dict[str, Any]:
 
 
 def _named(names: Any) -> dict[str, str]:
-    """Known columns by the names in a file: those whose name, without units, is a known word; else begins with one."""
+    """{known column: name in the file}. A name without its unit must be a known word, or else begin with one."""
     heads = {}
     for name in names:
         bare = str(name).lower().replace("-", "_").strip()

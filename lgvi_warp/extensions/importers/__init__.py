@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Readers of vehicles: SDF, URDF and YAML files of robotics packages. `lw.vehicles` names them."""
+"""Importers of vehicles from SDF, URDF and YAML files of robotics packages; they are public as `lw.vehicles`."""
 
 # The core looks no word of it up.
 HOLDS: dict[str, dict[str, str]] = {}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Includes of an SDF file: put in their place from files that the user names; no path or address of the file is opened."""
+"""Includes of an SDF file, replaced by files that the user names; no path or address in the SDF file is opened."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ MOST_NESTED = 8
 
 
 def put_in_place(root: Element, given: Any) -> None:
-    """Put models in the place of <include> elements whose <name>, <uri>, or its last part, is in a map of paths or texts."""
+    """Replace each <include> whose <name>, <uri> or last part of the <uri> is in a map of paths or texts by its model."""
     if not (isinstance(given, Mapping) and all(isinstance(each, str | os.PathLike) for each in given.values())):
         raise refusal(
             "include", given, "is not a map of files", "give include={'tethys': 'model.sdf'}: a path or text by name"
@@ -35,7 +35,7 @@ def put_in_place(root: Element, given: Any) -> None:
 
 
 def _put(root: Element, files: Mapping[str, Element], used: set[str], known: set[str], depth: int) -> int:
-    """Put models in place below an element; the number of elements there is then."""
+    """Replace the includes below an element by models; return the number of elements afterwards."""
     if depth > MOST_NESTED:
         raise SceneError([f"SDF include is nested more than {MOST_NESTED} deep, or in a circle. Correct the files"])
     size = sum(1 for _ in root.iter())
@@ -58,14 +58,14 @@ def _put(root: Element, files: Mapping[str, Element], used: set[str], known: set
 
 
 def names_of(include: Element) -> list[str]:
-    """By what an <include> may be named: its <name>, its <uri>, and the last part of that, also without %20."""
+    """Names of an <include>: its <name>, its <uri>, and the last part of its <uri>, also without %20."""
     uri = text_of(include.find("uri"))
     last = uri.rstrip("/").rpartition("/")[2]
     return [each for each in dict.fromkeys((text_of(include.find("name")), uri, last, unquote(last))) if each]
 
 
 def _model(root: Element, name: str, include: Element) -> Element:
-    """A copy of the model of a file with what its <include> says of it: name, pose, static, and plugins besides."""
+    """A copy of the model of a file, with the name, pose, static flag and added plugins of its <include>."""
     found = root if root.tag == "model" else root.find("model")
     if found is None:
         raise SceneError([f"SDF include {name!r}: the file has no <model>. Give the file of a model"])
@@ -83,7 +83,7 @@ def _model(root: Element, name: str, include: Element) -> Element:
 
 
 def _merged(model: Element, name: str) -> list[Element]:
-    """The parts of a model that becomes one with the model that includes it; its own frame becomes a frame of that model."""
+    """The parts of a model that is merged into the model that includes it; its own frame becomes a frame of that model."""
     if model.get("placement_frame"):
         raise SceneError([f"SDF include {name!r} is merged by a placement_frame. Include it without merge"])
     parts = [child for child in model if child.tag not in ("pose", "static")]

@@ -23,10 +23,11 @@ def _zeros() -> np.ndarray:
 
 @dataclass
 class Link:
-    """One link of a robot description, in its own axes (x ahead, y to port, z up) from its own origin; zero by default.
+    """One link of a robot description, in its own axes (x ahead, y to port, z up) from its own origin.
 
-    mass: [kg]. center: of mass (3,) [m]. inertia: (3, 3) [kg m2] about it. added_mass: (6, 6) about the origin.
-    volume: displaced [m3]. volume_center: (3,) [m]. shapeless: Names of collision shapes whose volume the file does not hold.
+    mass: [kg]. center: Centre of mass (3,) [m]. inertia: (3, 3) [kg m2] about `center`. added_mass: (6, 6) about the origin.
+    volume: Displaced volume [m3], with its centre `volume_center` (3,) [m]. All numbers are 0 by default.
+    shapeless: Names of collision shapes whose volume the file does not give.
     """
 
     name: str
@@ -80,7 +81,7 @@ FLAT = ("plane", "empty")
 
 
 def volume_of(faults: Faults, where: str, collision: Element) -> float | None:
-    """Volume [m3] of a collision's shape: 0 of a plane; None of a mesh and the like, which the file does not hold."""
+    """Volume [m3] of a collision shape: 0 for a plane; None if the file does not give the volume, as for a mesh."""
     geometry = collision.find("geometry")
     if geometry is None:
         if text_of(collision):
@@ -101,7 +102,7 @@ def volume_of(faults: Faults, where: str, collision: Element) -> float | None:
 
 
 def size_of(faults: Faults, where: str, shape: Element, key: str, default: str) -> np.ndarray:
-    """Sizes [m] of a shape, as many as the default has: an element in SDF and an attribute in URDF."""
+    """Sizes [m] of a shape, as many as the default has; they are an element in SDF and an attribute in URDF."""
     attribute = shape.get(key)
     if attribute is not None:
         return numbers_in(faults, f"{where}{key}", attribute, len(default.split()))
@@ -111,7 +112,7 @@ def size_of(faults: Faults, where: str, shape: Element, key: str, default: str) 
 def add_volumes(link: Link, shapes: Iterable[tuple[str, float | None, np.ndarray]]) -> None:
     """Set volume and centre of a link from its collision shapes, as Gazebo's Buoyancy system does.
 
-    shapes: Name, volume [m3] and centre (3,) [m] of each shape; volume None if the file does not hold it.
+    shapes: Name, volume [m3] and centre (3,) [m] of each shape; the volume is None if the file does not give it.
     """
     known = []
     for name, volume, center in shapes:
@@ -125,7 +126,7 @@ def add_volumes(link: Link, shapes: Iterable[tuple[str, float | None, np.ndarray
 
 
 def read_inertia(faults: Faults, where: str, element: Element | None, default: str = "1") -> np.ndarray:
-    """An inertia matrix (3, 3) [kg m2] from its six names in <inertia>: elements in SDF and attributes in URDF."""
+    """Inertia matrix (3, 3) [kg m2] from the six entries of <inertia>, which are elements in SDF and attributes in URDF."""
     named = {}
     for pair in PAIRS:
         key, fallback = f"i{pair}", default if pair[0] == pair[1] else "0"
@@ -141,7 +142,7 @@ def read_inertia(faults: Faults, where: str, element: Element | None, default: s
 
 
 def beside(joints: Iterable[Joint], types: tuple[str, ...] | None = None) -> dict[str, list[str]]:
-    """Return the neighbours of each link across joints of some types, or of any."""
+    """Return the neighbours of each link across joints of the given types, or of any type for None."""
     neighbours: dict[str, list[str]] = {}
     for joint in joints:
         if types is None or joint.type in types:
@@ -162,7 +163,7 @@ def joined(first: str, neighbours: Mapping[str, Sequence[str]]) -> list[str]:
 
 
 def main_link(links: Mapping[str, Link], joints: Sequence[Joint]) -> str:
-    """Return the main link: of the heaviest set of joined links the heaviest that is no joint's child."""
+    """Return the main link: the heaviest link that is no joint's child, within the heaviest set of joined links."""
     sets, remaining, neighbours = [], dict.fromkeys(links), beside(joints)
     while remaining:
         sets.append([name for name in joined(next(iter(remaining)), neighbours) if name in links])
@@ -175,7 +176,7 @@ def main_link(links: Mapping[str, Link], joints: Sequence[Joint]) -> str:
 
 
 def carried(pose: Pose) -> np.ndarray:
-    """X (6, 6): a link has the velocity X v, in its own axes, where the body has v."""
+    """X (6, 6): if the body has the velocity v, the link has the velocity X v in its own axes."""
     R, p = pose.rotation, pose.position
     return np.block([[R.T, -R.T @ hat(p)], [np.zeros((3, 3)), R.T]])
 
@@ -197,7 +198,7 @@ def lumped(links: Iterable[Link], main: Link) -> Lump:
 
 
 def _mean(weights: Sequence[float], points: Sequence[np.ndarray]) -> np.ndarray:
-    """Return the weighted mean of points; 0 if all weights are. A single point is returned to the last digit."""
+    """Return the weighted mean of points; 0 if all weights are 0. A single point is returned exactly."""
     total = sum(weights)
     for weight, point in zip(weights, points, strict=True):
         if weight == total:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Plugins of a robot description that give a link's coefficients: gz-sim's Hydrodynamics and that of uuv_simulator."""
+"""Plugins of a robot description that give the hydrodynamic coefficients of links: gz-sim's and uuv_simulator's."""
 
 from __future__ import annotations
 
@@ -31,8 +31,9 @@ UNREAD = {
 class Hydrodynamics:
     """Hydrodynamic coefficients of one link, in axes x ahead, y to starboard, z down, about its origin.
 
-    density: [kg/m3], and current: velocity (3,) [m/s] of the water, north, east, down; None if the plugin does not give it.
-    volume: Displaced [m3], as uuv_simulator gives it; None for gz-sim. volume_center: (3,) [m], in the link's own axes (z up).
+    density: Density of the water [kg/m3]. current: Velocity (3,) [m/s] of the water, north, east, down. Both are None if the
+    plugin does not give them. volume: Displaced volume [m3] in uuv_simulator; None for gz-sim. volume_center: Its centre
+    (3,) [m], in the link's own axes (z up).
     """
 
     link: str
@@ -48,21 +49,21 @@ class Hydrodynamics:
 
 
 def is_hydrodynamics(plugin: Element) -> bool:
-    """Return whether a plugin is Gazebo's Hydrodynamics: holds a coefficient, or bears the name and has a link.
+    """Return whether a plugin is Gazebo's Hydrodynamics: it holds a coefficient, or has that name and names a link.
 
-    Other plugins bear that name, too, and a controller's gain may be called kP as a drag coefficient is.
+    Other plugins have that name too, and a controller's gain may have the name kP, like a drag coefficient.
     """
     named = "hydrodynamics" in plugin_name(plugin) and plugin.find("link_name") is not None
     return named or any(_TERM.match(child.tag) and child.tag[0] in "xyz" for child in plugin)
 
 
 def is_underwater_object(plugin: Element) -> bool:
-    """Return whether a plugin is uuv_simulator's, which holds links with a hydrodynamic model."""
+    """Return whether a plugin is the one of uuv_simulator, which holds links with a hydrodynamic model."""
     return any(link.find("hydrodynamic_model") is not None for link in plugin.findall("link"))
 
 
 def unread(plugins: Sequence[Element]) -> list[str]:
-    """Return a warning for each kind of plugin that pushes the vehicle but is not read."""
+    """Return a warning for each kind of plugin that exerts a force on the vehicle but is not read."""
     lines = []
     for kind, (parts, remedy) in UNREAD.items():
         count = sum(any(part in plugin_name(plugin) for part in parts) and not is_read(plugin) for plugin in plugins)
@@ -134,7 +135,7 @@ def plugin_density(faults: Faults, plugin: Element) -> float | None:
 
 
 def read_underwater_object(faults: Faults, warnings: list[str], plugin: Element) -> list[Hydrodynamics]:
-    """Read the links of uuv_simulator's plugin; its matrices are in axes x ahead, y to starboard, z down already."""
+    """Read the links of uuv_simulator's plugin, whose matrices are already in axes x ahead, y to starboard, z down."""
     density = plugin_density(faults, plugin)
     density = 1028.0 if density is None else density  # kg/m3: the plugin's default
     return [read_underwater_link(faults, warnings, link, density) for link in plugin.findall("link")]
@@ -166,7 +167,7 @@ def read_underwater_link(faults: Faults, warnings: list[str], link: Element, den
 
 
 def block_matrix(faults: Faults, key: str, text: str) -> np.ndarray:
-    """Read a matrix (6, 6) from 36 numbers, or from the 6 of its diagonal; zeros of an empty text."""
+    """Read a matrix (6, 6) from 36 numbers, or from the 6 numbers of its diagonal; an empty text gives zeros."""
     if not text:
         return np.zeros((6, 6))
     values = floats(text)
@@ -184,7 +185,7 @@ def by_diagonal(warnings: list[str], quadratic: np.ndarray) -> np.ndarray:
 
 
 def shared(faults: Faults, tag: str, values: Sequence[Any], remedy: str) -> Any:
-    """Common statement of one body's plugins on its water; None where none has one."""
+    """The value that the plugins of one body give for a property of the water; None if no plugin gives one."""
     said = [value for value in values if value is not None]
     if any(not np.array_equal(value, said[0]) for value in said):
         shown = "; ".join(" ".join(f"{x:g}" for x in np.atleast_1d(value)) for value in said)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Poses of robot descriptions: where links, frames and shapes lie in their model, by the rules of SDF and URDF."""
+"""Poses of links, frames and shapes of a robot description in its model, by the rules of SDF and URDF."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Pose(NamedTuple):
     rotation: np.ndarray
 
     def then(self, inner: Pose) -> Pose:
-        """Return the pose in the outer frame of what has a pose in this frame."""
+        """Convert a pose in this frame to a pose in the outer frame."""
         return Pose(self.position + self.rotation @ inner.position, self.rotation @ inner.rotation)
 
     def inverse(self) -> Pose:
@@ -37,7 +37,7 @@ HERE = Pose(np.zeros(3), np.eye(3))
 
 
 def rotation_from_rpy(angles: np.ndarray) -> np.ndarray:
-    """Rz(yaw) Ry(pitch) Rx(roll), (3, 3), of roll, pitch, yaw (3,) [rad]."""
+    """Rotation matrix Rz(yaw) Ry(pitch) Rx(roll), (3, 3), from roll, pitch, yaw (3,) [rad]."""
     (sr, sp, sy), (cr, cp, cy) = np.sin(angles), np.cos(angles)
     first = [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr]
     second = [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr]
@@ -91,7 +91,7 @@ class Scope:
                     self.nested[name] = Scope(child, f"{self.prefix}{name}::", self)
 
     def each(self) -> Iterator[Scope]:
-        """Iterate over this scope and those nested in it."""
+        """Iterate over this scope and the scopes nested in it."""
         yield self
         for scope in self.nested.values():
             yield from scope.each()
@@ -107,7 +107,7 @@ class Scope:
         return scope, rest
 
     def link_of(self, name: str) -> str | None:
-        """Return the full name of the link that a name stands for; None if there is none."""
+        """Return the full name of the link that a name refers to; None if there is no such link."""
         scope, rest = self, name
         for _ in range(LONGEST_CHAIN):
             try:
@@ -164,7 +164,7 @@ class Poses:
         return self.of(*self.lookup(scope, relative_to), chain).then(read_pose(self.faults, where, pose))
 
     def lookup(self, scope: Scope, name: str) -> tuple[Scope, str]:
-        """Find what a name of a scope stands for."""
+        """Find the scope and the name that a name used in a scope refers to."""
         try:
             return scope.find(name)
         except KeyError:

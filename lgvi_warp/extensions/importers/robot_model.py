@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Models of SDF and URDF files, as read: links, joints, what plugins give, and the water of the world around them."""
+"""Models of SDF and URDF files as read: links, joints, coefficients from plugins, and the water of the world."""
 
 from __future__ import annotations
 
@@ -69,13 +69,13 @@ class RobotModel:
 
 
 def listed(names: Sequence[str], most: int = 20) -> str:
-    """Return names as one text, and how many more there are."""
+    """Return at most `most` names as one text, with the number of the names left out."""
     more = f" and {len(names) - most} more" if len(names) > most else ""
     return ", ".join(names[:most]) + more
 
 
 def refuse_crowd(elements: Sequence[Element]) -> None:
-    """Refuse more elements than any vehicle has, since the time to read them would have no bound."""
+    """Refuse more elements than any vehicle has, so that the reading time is bounded."""
     if len(elements) > MOST_LINKS:
         problem = f"the model has {len(elements):,} of <{elements[0].tag}>, more than {MOST_LINKS:,}"
         raise SceneError([sentences("SDF model", problem, "give the vehicle alone")])
@@ -85,7 +85,7 @@ def refuse_crowd(elements: Sequence[Element]) -> None:
 
 
 def read_model(faults: Faults, root: Element, name: str | None, link: str | None) -> RobotModel:
-    """Read the model of a file: that of a URDF, or the one of an SDF file that is named or alone."""
+    """Read the model of a URDF file, or the named or only model of an SDF file."""
     return model_of_urdf(faults, root) if root.tag == "robot" else model_of_sdf(faults, root, name, link)
 
 
@@ -103,7 +103,7 @@ def model_of_urdf(faults: Faults, root: Element) -> RobotModel:
 
 
 def model_of_sdf(faults: Faults, root: Element, name: str | None, link: str | None) -> RobotModel:
-    """Read one model of an SDF file: that of a name, the only one, or the only one with hydrodynamics."""
+    """Read one model of an SDF file: the model with the name, the only model, or the only one with hydrodynamics."""
     element, world = chosen_model(root, name, link)
     for tag in ("link", "joint", "plugin", "collision", "frame", "model"):
         refuse_crowd(list(element.iter(tag)))
@@ -134,7 +134,7 @@ def world_of(root: Element) -> Element:
 
 
 def chosen_model(root: Element, name: str | None, link: str | None) -> tuple[Element, Element | None]:
-    """Choose a top-level <model> of an SDF file, as `model_of_sdf` does, with the <world> that holds it or None."""
+    """Choose a top-level <model> of an SDF file by the rule of `model_of_sdf`; also return the <world> around it or None."""
     known: list[tuple[Element, Element | None]] = []
     known += [(child, world) for world in root.iter("world") for child in world.findall("model")]
     known += [(child, None) for child in ([root] if root.tag == "model" else root.findall("model"))]
@@ -189,7 +189,7 @@ def read_water(faults: Faults, warnings: list[str], world: Element) -> Water:
 
 
 def is_buoyancy(plugin: Element) -> bool:
-    """Return whether a plugin is Gazebo's Buoyancy, which is not its BuoyancyEngine."""
+    """Return whether a plugin is Gazebo's Buoyancy (BuoyancyEngine is another plugin)."""
     return "buoyancy" in plugin_name(plugin) and "engine" not in plugin_name(plugin)
 
 
@@ -228,7 +228,7 @@ def read_link(faults: Faults, warnings: list[str], poses: Poses, scope: Scope, n
 
 
 def joints_of(root: Scope, scope: Scope) -> list[Joint]:
-    """Read the joints of a scope; a detachable joint counts as fixed, as at the start."""
+    """Read the joints of a scope; a detachable joint counts as fixed, its state at the start."""
     joints = []
     for element in scope.named.values():
         if element.tag == "joint":
@@ -243,7 +243,7 @@ def joints_of(root: Scope, scope: Scope) -> list[Joint]:
 
 
 def read_fluid_added_mass(faults: Faults, where: str, element: Element | None) -> np.ndarray:
-    """Read <fluid_added_mass>, xx, xy ... rr, as (6, 6) in the link's axes about its origin; 0 where an entry is missing."""
+    """Read <fluid_added_mass>, xx, xy ... rr, as (6, 6) in the link's axes about its origin; missing entries are 0."""
     matrix = np.zeros((6, 6))
     for row, column in combinations_with_replacement(range(6), 2):
         value = number(faults, f"{where}<fluid_added_mass> ", element, "xyzpqr"[row] + "xyzpqr"[column], "0")

@@ -29,11 +29,11 @@ TEMPLATES = {
 
 
 class Refused(Exception):  # noqa: N818
-    """Raised for XML that is well-formed but not read; the text names the problem and the remedy."""
+    """Error for XML that is well-formed but refused; the text names the problem and the remedy."""
 
 
 class Reader:
-    """Handlers of expat that build a tree of elements; prefixes of names are kept as they are, bound or not."""
+    """Handlers of expat that build a tree of elements; prefixes of names are kept, even if they are not declared."""
 
     def __init__(self) -> None:
         self.tree, self.level, self.elements = TreeBuilder(), 0, 0
@@ -53,7 +53,7 @@ class Reader:
         self.tree.end(tag)
 
     def doctype(self, *_: Any) -> None:
-        """Refuse a document type, since it may declare entities, which can grow without end or name other files."""
+        """Refuse a document type, since it may declare entities, which can expand without bound or name other files."""
         raise Refused("has a document type declaration (<!DOCTYPE>), which is not read. Remove it")
 
 
@@ -78,7 +78,7 @@ def parse_xml(source: str | os.PathLike[str], format_name: str = "SDF") -> Eleme
 
 
 def remedy_for(content: bytes) -> str:
-    """Return what to do with a text that is not XML."""
+    """Return the remedy for a text that is not XML."""
     mark = next((mark for mark in (b"<%", b"{%", b"{{", b"@(", b"@{", b"=@") if mark in content), None)
     if mark is None:
         return "correct that line"
@@ -98,17 +98,17 @@ def read_bytes(source: Any, format_name: str) -> bytes:
 
 
 def text_of(element: Element | None) -> str:
-    """Return the text of an element, or of none, without spaces around it."""
+    """Return the text of an element without spaces around it; "" if there is no element."""
     return (element.text or "").strip() if element is not None else ""
 
 
 def child_of(parent: Element | None, tag: str) -> Element | None:
-    """The first child of an element; None where either is missing."""
+    """The first child of an element with a tag; None if the element or the child is missing."""
     return None if parent is None else parent.find(tag)
 
 
 def is_true(text: str | None) -> bool:
-    """Return the truth value that a text stands for in SDF."""
+    """Return whether a text means true in SDF."""
     return (text or "").strip().lower() in ("1", "true")
 
 
@@ -121,7 +121,7 @@ def floats(text: str) -> np.ndarray | None:
 
 
 def numbers_in(faults: Faults, key: str, text: str, count: int) -> np.ndarray:
-    """Return the numbers in a text that must hold a fixed count of finite ones; zeros after noting a fault."""
+    """Return the numbers in a text that must hold `count` finite numbers; zeros after adding a fault."""
     values = floats(text)
     if values is not None and values.shape == (count,) and np.all(np.isfinite(values)):
         return values
@@ -141,12 +141,12 @@ def read_floats(faults: Faults, where: str, parent: Element | None, tag: str, de
 
 
 def number(faults: Faults, where: str, parent: Element | None, tag: str, default: str) -> float:
-    """Return the number in a child of an element, or the default; 0 after noting a fault."""
+    """Return the number in a child of an element, or the default; 0 after adding a fault."""
     return float(read_floats(faults, where, parent, tag, default)[0])
 
 
 def plugins_of(element: Element) -> Iterator[Element]:
-    """Iterate over the plugins of a model and of the models nested in it, without those of included files."""
+    """Iterate over the plugins of a model and of the models nested in it, without plugins of included files."""
     for child in element:
         if child.tag == "plugin":
             yield child
@@ -155,5 +155,5 @@ def plugins_of(element: Element) -> Iterator[Element]:
 
 
 def plugin_name(plugin: Element) -> str:
-    """Return name and file name of a plugin, by which it is recognised."""
+    """Return the name and file name of a plugin, which identify it."""
     return (plugin.get("name", "") + " " + plugin.get("filename", "")).lower()

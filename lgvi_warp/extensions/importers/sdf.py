@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Vehicles from the robot descriptions that Gazebo reads: SDF, and URDF with the plugin of uuv_simulator or Gazebo."""
+"""Vehicles from the robot descriptions that Gazebo reads: SDF, and URDF with a plugin of uuv_simulator or Gazebo."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def from_sdf(
 ) -> dict[str, Any]:
     """Build a vehicle, its drag and its water from an SDF file (Gazebo) or a URDF.
 
-    The file is read as Gazebo reads it:
+    The following parts of the file are read, with the meaning that Gazebo gives them:
 
     * mass, pose, inertia and fluid_added_mass of every link;
     * volume and centre of the collision shapes (box, sphere, cylinder, capsule, ellipsoid, cone);
@@ -48,29 +48,29 @@ def from_sdf(
       all positive, and the plugin of uuv_simulator;
     * gravity and the Buoyancy plugin of a <world>.
 
-    Links that joints join become one body about the origin of the main link. Links that can move are held where the
-    file has them, and warnings name them. Gazebo's axes (x ahead, y to port, z up) are turned into those of the scene
-    file (x ahead, y to starboard, z down).
+    All links connected by joints become one rigid body about the origin of the main link. Links that can move are fixed at
+    their position in the file, and warnings name them. Gazebo's axes (x ahead, y to port, z up) are converted to those of
+    the scene file (x ahead, y to starboard, z down).
 
     Args:
         source: Path of the file, or its text.
-        model: Name of the model, where the file holds several.
-        link: Name of the main link; by default that of the plugin, else the first of the heaviest joined links.
-        world: Another SDF file (path or text), in whose <world> the model is placed: it gives gravity and density.
-        buoyancy: Buoyancy [N], in place of that of the shapes.
-        volume: Displaced volume [m3], in place of that of the shapes.
+        model: Name of the model, if the file holds several.
+        link: Name of the main link; by default the link named by the plugin, else the first of the heaviest joined links.
+        world: Another SDF file (path or text) with a <world> that gives gravity and density for the model.
+        buoyancy: Buoyancy [N], instead of the buoyancy of the shapes.
+        volume: Displaced volume [m3], instead of the volume of the shapes.
         water_density: Density of the water [kg/m3]; by default that of the world or of a plugin, else 1000.
-        center_of_buoyancy: Position (3,) [m] in the main link's axes (z up), in place of that of the shapes.
+        center_of_buoyancy: Position (3,) [m] in the main link's axes (z up), instead of the centre of the shapes.
         gravity: Acceleration of free fall [m/s2]; by default the world's, else 9.80665.
-        include: SDF files (path or text) by the <name>, the <uri> or its last part, that stand in the place of <include>
-            elements with their plugins; by default none: what the file names is never opened by itself.
+        include: {name: SDF file}, each file as path or text, that replace <include> elements. The name is the <name>, the
+            <uri> or the last part of the <uri>. By default none; a file named inside `source` is never opened.
 
     Returns:
         The tables "vehicle", "environment" and "terms" of a scene file. Without a shape the vehicle is neutral.
 
     Raises:
-        SceneError: If anything is wrong, such as a mass that is no number, a mesh without a volume given, or a
-            template; the message lists every fault.
+        SceneError: If the file is invalid, such as a mass that is not a number, a mesh without `volume`, or a template. The
+            message lists every fault.
     """
     faults = Faults()
     root = parse_xml(source, "SDF")
@@ -123,7 +123,7 @@ def refuse_empty(faults: Faults, read: RobotModel) -> None:
 
 
 def refuse_unweighed(read: RobotModel, main: Link, parts: Sequence[Link]) -> None:
-    """Refuse a main link without inertia; note other links without it, to which Gazebo gives 1 kg."""
+    """Refuse a main link without inertia; add a warning for other links without inertia, to which Gazebo gives 1 kg."""
     if not main.weighed:
         raise SceneError([f"SDF link {main.name!r} has no <inertial>. Add mass, pose and inertia"])
     unweighed = [body_link.name for body_link in parts if not body_link.weighed]
@@ -134,7 +134,7 @@ def refuse_unweighed(read: RobotModel, main: Link, parts: Sequence[Link]) -> Non
 def weight_of(read: RobotModel, volume: float | None) -> float | None:
     """Return the weight [N] of the displaced water; warn if no shape displaces any.
 
-    It is None if it is unknown, or nothing is displaced though buoyancy is not restricted to some models.
+    The weight is None if it is unknown, or if no shape displaces water although buoyancy is not limited to some models.
     """
     water = read.water
     if not volume and not water.enabled:
@@ -146,7 +146,8 @@ def weight_of(read: RobotModel, volume: float | None) -> float | None:
 def body_of(faults: Faults, lump: Lump, buoyancy: float | None, at: Any, gravity: float | None) -> Coefficients:
     """Build the rigid body of lumped links, in axes x ahead, y to starboard, z down.
 
-    buoyancy: [N]; None for the weight. at: Centre of buoyancy (3,) [m], z down. gravity: [m/s2]; None if it is at fault.
+    buoyancy: [N]; None for a buoyancy equal to the weight. at: Centre of buoyancy (3,) [m], z down. gravity: [m/s2]; None if
+    gravity is invalid.
     """
     inertia = HALF_TURN[:, None] * lump.inertia * HALF_TURN
     gravity = 0.0 if gravity is None else gravity  # a fault by then
@@ -156,7 +157,7 @@ def body_of(faults: Faults, lump: Lump, buoyancy: float | None, at: Any, gravity
 
 
 def chosen_link(read: RobotModel, link: str | None) -> str:
-    """The full name of the main link: that of a name, that of the plugin, or the first of the heaviest joined links."""
+    """The full name of the main link: the given link, the plugin's link, or the first of the heaviest joined links."""
     if link is not None:
         return link_named(read.links, link)
     if read.hydrodynamics:
@@ -165,7 +166,7 @@ def chosen_link(read: RobotModel, link: str | None) -> str:
 
 
 def together(read: RobotModel, main: Link) -> list[str]:
-    """Return the links that form one body with the main link; warn of moving links and of those left out."""
+    """Return the links that form one body with the main link; warn of moving links and of links left out."""
     every = [name for name in joined(main.name, beside(read.joints)) if name in read.links]
     fixed = set(joined(main.name, beside(read.joints, ("fixed",))))
     moving = [name for name in every if name not in fixed]
@@ -179,7 +180,7 @@ def together(read: RobotModel, main: Link) -> list[str]:
 
 
 def set_water(faults: Faults, read: RobotModel, density: float | None, gravity: float | None) -> None:
-    """Set density [kg/m3] and gravity [m/s2] of the model: as given, else the world's, else a plugin's, else the default."""
+    """Set density [kg/m3] and gravity [m/s2] of the model: given, else the world's, else a plugin's, else the default."""
     density = read.water.density if density is None else density
     if density is None:
         density = shared(faults, "water_density", [each.density for each in read.hydrodynamics], "pass water_density=")
@@ -192,7 +193,7 @@ def set_water(faults: Faults, read: RobotModel, density: float | None, gravity: 
 def displaced_by(
     read: RobotModel, parts: Sequence[Link], main: Link, plugins: Sequence[Hydrodynamics]
 ) -> tuple[float, np.ndarray]:
-    """Displaced volume [m3] and its centre (3,) [m] in the main link's axes (z up), of shapes or as uuv_simulator gives it."""
+    """Displaced volume [m3] and its centre (3,) [m] in the main link's axes (z up), from shapes or from uuv_simulator."""
     by_plugin = [hydrodynamics for hydrodynamics in plugins if hydrodynamics.volume is not None]
     for hydrodynamics in by_plugin:
         body_link = read.links[hydrodynamics.link]
@@ -214,7 +215,7 @@ def has_buoyancy(read: RobotModel, name: str) -> bool:
 
 
 def refuse_shapeless(faults: Faults, read: RobotModel, parts: Sequence[Link], plugins: Sequence[Hydrodynamics]) -> None:
-    """Note shapes whose volume lies in another file, and no plugin has: without them the vehicle would sink."""
+    """Add a fault for shapes whose volume neither this file nor a plugin gives: without them the vehicle would sink."""
     if any(hydrodynamics.volume is not None for hydrodynamics in plugins):
         return
     for body_link in parts:

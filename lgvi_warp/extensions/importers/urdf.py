@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Links and joints of a URDF. A xacro, which is a program that writes one, is refused."""
+"""Links and joints of a URDF. A xacro file, which is a program that writes a URDF, is refused."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from lgvi_warp.extensions.importers.robot_xml import TEMPLATES, numbers_in
 
 
 def refuse_xacro(root: Element) -> None:
-    """Refuse a file with elements of xacro, naming the first."""
+    """Refuse a file with elements of xacro; the message names the first."""
     for element in root.iter():
         if element.tag.startswith("xacro:"):
             shown = " ".join([element.tag, *(f'{key}="{value}"' for key, value in element.attrib.items())])[:80]
@@ -36,7 +36,7 @@ def read_urdf(faults: Faults, root: Element) -> tuple[dict[str, Link], list[Join
 
 
 def read_link(faults: Faults, element: Element) -> Link:
-    """Read one link of a URDF file; without <inertial> it is a frame, and weighs nothing."""
+    """Read one link of a URDF file; a link without <inertial> is a frame without mass."""
     link = Link(element.get("name", ""))
     inertial = element.find("inertial")
     if inertial is not None:
@@ -57,7 +57,7 @@ def read_link(faults: Faults, element: Element) -> Link:
 
 
 def place(faults: Faults, links: dict[str, Link], origins: dict[str, tuple[str, Pose]]) -> None:
-    """Set the pose of each link from those of the joints above it."""
+    """Set the pose of each link from the origins of the joints between the root and the link."""
     for name, link in links.items():
         above, passed = name, {name}
         while above in origins:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Vehicles from a YAML file of coefficients, as robotics packages use."""
+"""Vehicles from a YAML file of coefficients, as used by robotics packages."""
 
 from __future__ import annotations
 
@@ -52,33 +52,33 @@ def from_yaml(
 ) -> dict[str, Any]:
     """Build a vehicle, its drag and its water from a YAML file of a robotics package (uuv_simulator, Plankton).
 
-    Keys, at the top or one table below:
+    The file has these keys, at its top level or in one of its tables:
 
-    * mass; inertia (3, 3x3 or ixx ...) about the centre of gravity; cog, cob; or mass_matrix (6x6 or 6), that of the
-      rigid body about the origin of the axes;
+    * mass, inertia (3, 3x3 or ixx ...) about the centre of gravity, cog and cob; or mass_matrix (6x6 or 6), the matrix of
+      the rigid body about the origin of the axes;
     * volume (with density), buoyancy or neutrally_buoyant;
     * added_mass (6x6 or 6); linear_damping, linear_damping_forward_speed and quadratic_damping (6 or 6x6), as
       derivatives or magnitudes; or a map `coefficients` of Fossen's names.
 
-    Damping in proportion to the forward speed, force_i = -u d_ij v_j, becomes a term body_lift.
+    Damping that is proportional to the forward speed u, force_i = -u d_ij v_j, becomes a term body_lift.
 
     Args:
         source: Path of the file, or its text.
         position_axes: Axes of the centres and of the inertia: "flu" (x ahead, y to port, z up, as in uuv_simulator;
             default) or "frd" (x ahead, y to starboard, z down).
         matrix_axes: Axes of added mass and damping: "frd" (as in uuv_simulator; default) or "flu".
-        quadratic: What a 6x6 matrix of quadratic damping stands for: its "diagonal" (as in uuv_simulator; default), or
-            "full" for the whole matrix.
+        quadratic: Entries used of a 6x6 matrix of quadratic damping: "diagonal" (as in uuv_simulator; default), or "full"
+            for the whole matrix.
         ignore: Keys to leave out; other unknown keys are refused. By default none.
-        table: Path in the file to the table that is read, such as "vehicle.dynamics", or a list of its keys; by default all of
-            the file.
-        **given: Values by key (mass=..., density=...) that add to the file's or replace them.
+        table: Path in the file to the table to read, such as "vehicle.dynamics", or a list of keys; by default the whole
+            file.
+        **given: Values by key (mass=..., density=...) that are added to those of the file or replace them.
 
     Returns:
         The tables "vehicle", "environment" and "terms" of a scene file.
 
     Raises:
-        SceneError: If anything is wrong; the message lists every fault.
+        SceneError: If the file is invalid; the message lists every fault.
         ImportError: If PyYAML is not installed.
 
     Examples:
@@ -124,7 +124,7 @@ def parse_yaml(source: str | os.PathLike[str]) -> Mapping[str, Any]:
 
 
 def table_of(content: Mapping[str, Any], path: Any) -> Mapping[str, Any]:
-    """The table at a path in a file, or all of it."""
+    """The table at a path in a file, or the whole file."""
     if path is None:
         return content
     keys = [path] if isinstance(path, str) and path in content else path.split(".") if isinstance(path, str) else path
@@ -140,9 +140,10 @@ def table_of(content: Mapping[str, Any], path: Any) -> Mapping[str, Any]:
 
 
 def add_rigid_body(faults: Faults, read: dict[str, Any], matrices: np.ndarray, positions: np.ndarray) -> None:
-    """Add mass, inertia and centre of gravity of a mass matrix about the origin of the axes to those of a file.
+    """Add the mass, inertia and centre of gravity of a mass matrix about the origin to the values read from a file.
 
-    matrices (6,), positions (3,): signs that turn its axes, and those of positions, into x ahead, y to starboard, z down.
+    matrices (6,), positions (3,): Signs that convert the axes of the matrix, and those of positions, to x ahead, y to
+    starboard, z down.
     """
     value = read["mass_matrix"]
     for key in {"mass", "inertia", "center_of_gravity"} & set(read):
@@ -161,9 +162,9 @@ def add_rigid_body(faults: Faults, read: dict[str, Any], matrices: np.ndarray, p
 
 
 def by_meaning(faults: Faults, content: Mapping[str, Any], ignore: set[str], reported: list[Any]) -> dict[str, Any]:
-    """Sort values by what their keys mean: aliases resolved, tables opened, Fossen's names gathered.
+    """Values by the meaning of their keys: aliases are resolved, tables are opened, Fossen's names are collected.
 
-    told: Unknown keys so far.
+    reported: Unknown keys so far.
     """
     meanings = {alias: name for name, aliases in _ALIASES.items() for alias in aliases}
     read: dict[str, Any] = {}
@@ -194,7 +195,7 @@ def by_meaning(faults: Faults, content: Mapping[str, Any], ignore: set[str], rep
 def yaml_body(faults: Faults, read: Mapping[str, Any], positions: np.ndarray) -> fossen.Coefficients:
     """Build mass, inertia, centres and forces of a body from a YAML map.
 
-    positions: Sign of each axis (3,), to turn positions and inertia into x ahead, y to starboard, z down.
+    positions: Sign of each axis (3,), to convert positions and inertia to x ahead, y to starboard, z down.
     """
     inertia = read.get("inertia")
     if isinstance(inertia, Mapping):
@@ -231,7 +232,7 @@ def is_neutral(faults: Faults, read: Mapping[str, Any]) -> bool:
 
 
 def displaced_weight(faults: Faults, volume: Any, density: Any, gravity: Any, is_given: bool) -> float | None:
-    """Return the weight [N] of the displaced water of a volume [m3]; None after noting a fault."""
+    """Return the weight [N] of the water that a volume [m3] displaces; None after adding a fault."""
     if not is_given:
         faults.positive("density", "not given", "kg/m3 (with volume)")
     values = [faults.positive("volume", volume, "m3"), density, Faults().number("gravity", gravity, least=0.0)]
@@ -239,7 +240,7 @@ def displaced_weight(faults: Faults, volume: Any, density: Any, gravity: Any, is
 
 
 def matrix_6(faults: Faults, key: str, value: Any) -> np.ndarray:
-    """A matrix (6, 6) of added mass or damping, positive on its diagonal, from either sign convention; zeros for none."""
+    """Matrix (6, 6) of added mass or damping from either sign convention, with a positive diagonal; zeros for None."""
     array = None if value is None else faults.finite(key, value)
     if array is None:
         return np.zeros((6, 6))

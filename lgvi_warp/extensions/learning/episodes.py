@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Members that start anew in some lanes while the others go on, between two ticks of a controller that asks the host."""
+"""Members that are restarted in some lanes between two ticks, while the other members continue."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from lgvi_warp.sampling.members import Members
 
 
 class Episodes:
-    """One block of members, of which any may be replaced after a tick; `steps` counts the steps made.
+    """One block of members, each of which may be replaced by a new member after a tick; `steps` counts the steps done.
 
-    Those that come next are packed and looked at ahead, many at once, in packets of their own. When one starts, its lane is
-    copied. So a start costs little, and no bit of the others changes.
+    New members are packed and evaluated in advance, many at once, in separate packets. To start one, its lane is copied. So a
+    start costs little and changes no bit of the other members.
     """
 
     def __init__(self, plan: Plan, members: Members):
@@ -33,7 +33,7 @@ class Episodes:
         self.begin(members)
 
     def begin(self, members: Members) -> None:
-        """Start all members anew, at t = 0. Nothing is prepared any more."""
+        """Start all members at t = 0, and discard prepared members."""
         self.packets.refill(members)
         self.packets.launch(0, 0)
         self.steps = 0
@@ -45,28 +45,28 @@ class Episodes:
         self._next_lanes: list[np.ndarray] = []
 
     def advance(self, values: np.ndarray) -> None:
-        """Answer the last tick by demands (m, 6), or commands (m, channels), and go on to the next one."""
+        """Set the demands (m, 6) or commands (m, channels) of the last tick, and advance to the next tick."""
         write_answer(self.packets, values)
         self.packets.launch(self.steps, self.steps + self.every)
         self.steps += self.every
 
     def signals(self) -> tuple[CallbackInput, CallbackInput]:
-        """Values measured and wanted now: (measured, wanted)."""
+        """The present (measured, wanted) values."""
         return last_tick(self.packets)
 
     def status(self) -> np.ndarray:
-        """The status of each member (m,), 0 for those that go on."""
+        """The status of each member (m,), 0 for members under way."""
         if not self.packets.status.numpy().any():
             return np.zeros(self.packets.members.count, np.uint8)
         return self.packets.ended()[0]
 
     def room_for(self, count: int) -> int:
-        """Number of members to draw for some that are prepared: few different numbers, for each of which packets are kept."""
+        """Number of members to draw for `count` prepared ones: rounded up to few sizes, since packets are kept for each."""
         width = self.plan.spec.width
         return width << (-(-count // width) - 1).bit_length()
 
     def prepare(self, lanes: np.ndarray, members: Members) -> None:
-        """Prepare the members that are to start next in some lanes (r,) of the m."""
+        """Prepare the members that will start next in some lanes (r,) of the m lanes."""
         aside = self._aside_for(members.count, lambda count: members)
         aside.refill(members)
         if aside.laws.places != self.packets.laws.places:
@@ -81,7 +81,7 @@ class Episodes:
     def restart(self, lanes: np.ndarray) -> tuple[CallbackInput, CallbackInput]:
         """Start the prepared members.
 
-        lanes: (r,), which of the m lanes. Returns: (measured, wanted) of them, (r, ...).
+        lanes: Indices (r,) among the m lanes. Returns: (measured, wanted) values of these members, (r, ...).
         """
         assert self._next is not None
         rehearsals = self._rehearsals()
@@ -97,9 +97,9 @@ class Episodes:
         return last_tick(aside, places)
 
     def signals_of(self, lanes: np.ndarray) -> tuple[CallbackInput, CallbackInput]:
-        """Values that ended members measure and want in their last state; in the block itself they rest meanwhile.
+        """Measured and wanted values of ended members in their last state; the block itself no longer computes them.
 
-        lanes: (r,), which of the m lanes. Returns: (measured, wanted), (r, ...).
+        lanes: Indices (r,) among the m lanes. Returns: (measured, wanted) values, (r, ...).
         """
         places = np.arange(len(lanes))
         aside = self._aside_for(self.room_for(len(lanes)), self._any)
@@ -109,18 +109,18 @@ class Episodes:
         return last_tick(aside, places)
 
     def _aside_for(self, count: int, members: Callable[[int], Members]) -> Packets:
-        """Packets of so many members."""
+        """Separate packets for `count` members."""
         if count not in self._aside:
             self._aside[count] = Packets(self.plan, members(count))
         return self._aside[count]
 
     def _any(self, count: int) -> Members:
-        """Some members of the run."""
+        """Any `count` members of the run."""
         chosen = np.arange(count) % self.plan.ensemble.members
         return self.plan.ensemble.subset(chosen).select(0, count)
 
     def _rehearsals(self) -> range:
-        """Steps after which those that start are looked at besides: late readings, and what is wanted at times, need it."""
+        """Further steps at which new members are evaluated, as needed by delayed readings and time-dependent guidance."""
         parts = (*self._controller.sensors, *self._controller.guidance)
         ticks = max((part.ticks_before for part in parts), default=0)
         last = self.steps // self.every
@@ -129,7 +129,7 @@ class Episodes:
     def _copy(
         self, source: list[np.ndarray], source_lanes: np.ndarray, target: list[np.ndarray], target_lanes: np.ndarray
     ) -> None:
-        """Copy lanes with all that belongs to them."""
+        """Copy lanes with all their data."""
         width = self.plan.spec.width
         p, i = np.divmod(source_lanes, width)
         q, j = np.divmod(target_lanes, width)
@@ -139,7 +139,7 @@ class Episodes:
 
 
 def _lanes_of(packets: Packets) -> list[np.ndarray]:
-    """The arrays in which lanes have numbers, (packets, ..., width), or (1, ..., width or 1) where members share them."""
+    """Arrays with numbers of lanes, (packets, ..., width), or (1, ..., width or 1) for numbers that members share."""
     laws = packets.laws
     lanes = [leaf for each in (packets.inertia, *laws.structs) for leaf in _leaves(each.view)]
     lanes += [each.view for each in (laws.table, laws.memory, packets.state_lanes)]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`lw.gym.VectorEnv`: thousands of vehicles as one vector environment of Gymnasium, whose steps are a controller's periods."""
+"""`lw.gym.VectorEnv`: many vehicles as one vector environment of Gymnasium; a step is a period of the controller."""
 
 from __future__ import annotations
 
@@ -39,40 +39,40 @@ OfTicks = Callable[..., Any]
 class Vehicles:
     """Vehicles as a vector environment of Gymnasium; one step is one period of the scene's controller.
 
-    An action is a demand, or a command of an actuator, held until the next tick. An observation has measured values, with
-    the errors of sensors, and wanted values. Vehicles that fail, or that an event of the scene stops, are terminated. Each
-    episode of each environment is another member of the ensemble: with other draws of all that varies. Laws of the scene
-    stay active, and the actions are added to their demands.
+    An action is a demand, or a command of an actuator, held until the next tick. An observation holds measured values,
+    including sensor errors, and wanted values. A vehicle that fails, or that an event of the scene stops, is terminated.
+    Each episode of each environment is a different member of the ensemble, with its own draws of all varied numbers. Laws of
+    the scene stay active, and the actions are added to their demands.
 
     `observe`, `reward` and `terminated` may be functions of (t, y, r): the time since the environments began [s], the measured
     and the wanted values (`lw.control.CallbackInput`) of m vehicles at once.
 
     Args:
-        fleet: The ensemble, or a scene with its own; with a controller.
-        observe: Names of numbers (docs/controllers/gym.md has the list), those of `lw.control.Policy` among them; or a
+        fleet: An ensemble, or a scene with an ensemble of its own. The scene must have a controller.
+        observe: Names of numbers, as listed in docs/controllers/gym.md and including the inputs of `lw.control.Policy`; or a
             function that returns (m, k).
-        act: "demand" (default): actions are added to the laws' demands. "command", or the key of a term: actions are the
-            commands of the only term that takes commands, or of this term, in place of the laws'.
+        act: "demand" (default): actions are added to the laws' demands. "command": actions are the commands of the only term
+            that takes commands. The key of a term: actions are its commands. Commands by actions replace those of the laws.
         reward: Function that returns (m,); it may take the actions (m, n) as a fourth argument. None (default): 0.
-        terminated: Function that returns truth values (m,), where an episode is to end; None (default) for none.
-        duration: Length of an episode [s], after which it is truncated; default the scene's [run] duration, else without end.
-        num_envs: Number of environments; default the members of the ensemble.
-        outputs: Which of the demands "X", "Y", "Z", "K", "M", "N" the actions are; all by default.
-        scale: Demand or command of an action of 1, a number or one for each; actions then lie in [-1, 1]. None (default):
-            actions are in N and N m, without bounds; or in the unit of the commands, within their limits.
-        instead_of: Keys of laws that the actions stand in for. A `Callback` always gives way. None by default.
+        terminated: Function that returns truth values (m,), True for each episode to end; None (default): no episode ends so.
+        duration: Length of an episode [s], after which it is truncated; default the scene's [run] duration, else no limit.
+        num_envs: Number of environments; default the number of members of the ensemble.
+        outputs: Demands among "X", "Y", "Z", "K", "M", "N" that the actions are; all by default.
+        scale: Demand or command at an action of 1, one number for all or one for each; actions are then in [-1, 1]. None
+            (default): actions are demands in N and N m without bounds, or commands in their unit within their limits.
+        instead_of: Keys of laws that the actions replace. A `Callback` is always replaced. None by default.
         autoreset_mode: gymnasium.vector.AutoresetMode or its value: "NextStep" (default), "SameStep" or "Disabled".
         method: A name or a Method; default that of the scene.
         h: Step [s]; default that of the scene.
-        dtype: Numbers of the kernel and of the observations, "float64" or "float32"; default that of the scene.
-        width: Vehicles per packet; default from the CPU.
+        dtype: Type of the kernel's numbers and of observations, "float64" or "float32"; default that of the scene.
+        width: Number of vehicles in a packet; default from the CPU.
 
     Attributes:
-        members: Indices of the members that the environments have now, (num_envs,).
-        time: Time since all began [s].
+        members: Indices of the members in the environments at present, (num_envs,).
+        time: Time since all environments began [s].
 
     Raises:
-        SceneError: If anything is wrong; the message lists every fault.
+        SceneError: If an argument is invalid; the message lists every fault.
         MissingExtra: If Gymnasium is not installed.
     """
 
@@ -149,7 +149,7 @@ class Vehicles:
         self._mode = mode
 
     def _planned(self, method: Any, h: float | None, dtype: str | None, width: int | None) -> Plan:
-        """The plan of a run as long as there can be."""
+        """The plan of a run of the largest possible length."""
         scene = self._fleet.scene
         t1 = longest(scene, scene.run.step if h is None else h)
         members = max(self.num_envs, self._fleet.members) if self._random else self._fleet.members
@@ -161,7 +161,7 @@ class Vehicles:
         return plan
 
     def _spaces(self, gymnasium: Any, to: str | None, scale: Any) -> None:
-        """Look at the first members, and say what actions and observations are."""
+        """Set the spaces of actions and observations, from the first members."""
         self._index = np.arange(self.num_envs)
         # Episodes that each environment has begun before this one, and the one among all that is prepared next.
         self._numbers = np.zeros(self.num_envs, np.int64)
@@ -195,12 +195,12 @@ class Vehicles:
         self.observation_space = batched(self.single_observation_space, self.num_envs)
 
     def _seed(self, seed: int) -> None:
-        """Draw from now on by this seed."""
+        """Use this seed for all draws from now on."""
         self._source = self._fleet.with_seed(seed, MOST_MEMBERS if self._random else None)
         self._noises = 0 if self._random else int(self._source.indices.max()) + 1
 
     def _drawn(self, episodes: np.ndarray) -> Members:
-        """The members of episodes, counted over all environments; where members come again, they do with other noise."""
+        """The members of episodes, counted over all environments. A member that is used again gets other noise."""
         times, places = np.divmod(episodes, self._source.members)
         subset = self._source.subset(places)
         members = subset.select(0, len(places))
@@ -215,27 +215,27 @@ class Vehicles:
 
     @property
     def time(self) -> float:
-        """Time since all began [s], which forces and guidance that depend on time see."""
+        """Time since all environments began [s], the time t of forces and guidance that depend on time."""
         return self._episodes.steps * self._plan.grid.h
 
     @property
     def members(self) -> np.ndarray:
-        """Indices of the members (num_envs,) that the environments have now."""
+        """Indices of the members (num_envs,) in the environments at present."""
         return self._episode_of(self._numbers) % self._source.members
 
     def _episode_of(self, numbers: np.ndarray) -> np.ndarray:
-        """Number of each environment's episode among all, where it has begun so many before."""
+        """Index of an episode among those of all environments, from the number of earlier episodes of its environment."""
         return self._index + numbers * self.num_envs
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[np.ndarray, dict[str, Any]]:
-        """Begin new episodes: of all environments, with the time at 0, or of those in options["reset_mask"].
+        """Begin new episodes of all environments, with the time at 0, or of the environments in options["reset_mask"].
 
         Args:
-            seed: Seed of the draws from now on, with which the episodes are counted anew. None (default): the next members,
-                the first ones by the seed of the ensemble.
-            options: {"reset_mask": truth values (num_envs,)}; None (default) for all.
+            seed: Seed of all draws from now on; episodes are counted from 0 again. None (default): the episodes use the next
+                members. At the first reset these are drawn with the seed of the ensemble.
+            options: {"reset_mask": truth values (num_envs,)}; None (default) for all environments.
 
         Returns:
             (observations of all environments, {}).
@@ -274,15 +274,17 @@ class Vehicles:
         """Hold the actions for a period.
 
         Args:
-            actions: (num_envs, n), in the order of `outputs` or of the commands. They are not clipped: actuators have limits.
+            actions: (num_envs, n), in the order of `outputs` or of the commands. They are not clipped here, since actuators
+                have limits.
 
         Returns:
-            (observations, rewards, terminations, truncations, infos). infos has "status" (see `lw.Status`) and the mask
-            "_status" where vehicles have ended by themselves, and what Gymnasium asks for with autoreset "SameStep".
+            (observations, rewards, terminations, truncations, infos). If vehicles failed or were stopped by an event, infos
+            has "status" (see `lw.Status`) and the mask "_status". With autoreset "SameStep" it also has the entries that
+            Gymnasium requires.
 
         Raises:
-            ValueError: If the actions have another shape, or are no real numbers.
-            ResetNeeded: Before the first `reset`; with autoreset "Disabled" where an episode has ended; and after
+            ValueError: If the actions have another shape, or are not real numbers.
+            ResetNeeded: Before the first `reset`; with autoreset "Disabled" after an episode has ended; and after
                 2^31 integration steps, when all environments must be reset.
         """
         return self._stepped(actions, self._mode)
@@ -290,7 +292,7 @@ class Vehicles:
     def _stepped(
         self, actions: Any, mode: str
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
-        """`step` by a way of autoreset."""
+        """`step` with a given autoreset mode."""
         last, episodes = self._done, self._episodes
         if not self._begun or (mode == "Disabled" and last.any()):
             raise needed().error.ResetNeeded("an episode has ended, or none has begun: call reset first")
@@ -341,7 +343,7 @@ class Vehicles:
         return observed.copy(), rewards, terminations, truncations, infos
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle what it was made of: the copy is a new environment that has not begun."""
+        """Pickle the constructor's arguments: the copy is a new environment that has not begun."""
         return _remade, (self._made_of,)
 
     def _begin_next(self, envs: np.ndarray) -> None:
@@ -349,7 +351,7 @@ class Vehicles:
         self._periods_made[envs] = 0
 
     def _restarted(self, envs: np.ndarray) -> np.ndarray:
-        """Start the present episodes of some environments; their first observations."""
+        """Start the present episodes of some environments, and return their first observations."""
         following = self._numbers + 1
         following[envs] -= 1
         wanted = self._episode_of(following)
@@ -362,7 +364,7 @@ class Vehicles:
         return self._seen(*self._episodes.restart(envs))
 
     def _tick_at_ends(self, envs: np.ndarray, y: CallbackInput, r: CallbackInput) -> None:
-        """Put what is seen in the states in which vehicles ended in place of what is seen of them at rest."""
+        """Replace the values of ended vehicles in y and r by the values in their final states."""
         for signals, part in zip((y, r), self._episodes.signals_of(envs), strict=True):
             for name, value in vars(part).items():
                 if value is not None:
@@ -395,12 +397,12 @@ class Vehicles:
 
 
 def step_by(mode: str, env: Vehicles, actions: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict]:
-    """A step of an environment with a way of autoreset that another library wants, whatever its own."""
+    """A step of an environment with the autoreset mode of another library, whatever the environment's own mode."""
     return env._stepped(actions, mode)
 
 
 def needed() -> Any:
-    """Gymnasium."""
+    """The module gymnasium, or an error if it is not installed."""
     try:
         import gymnasium
     except ImportError as error:
@@ -410,7 +412,7 @@ def needed() -> Any:
 
 @functools.cache
 def _vector_env() -> type:
-    """`Vehicles` as a class of Gymnasium's, made when it is used first: Gymnasium may be absent."""
+    """`Vehicles` as a subclass of Gymnasium's VectorEnv, created at its first use, since Gymnasium may be absent."""
     base = needed().vector.VectorEnv
     return type("VectorEnv", (Vehicles, base), {"__doc__": Vehicles.__doc__, "__module__": __name__})
 
@@ -436,12 +438,12 @@ def _whole_periods(duration: float | None, period: float) -> float:
 
 
 def _nothing(size: int, t: float, y: CallbackInput, r: CallbackInput, members: np.ndarray) -> np.ndarray:
-    """The answer of a callback where no environment gives one."""
+    """The answer of the callback if no environment gives one: zeros."""
     return np.zeros((len(members), size))
 
 
 def _actuator(faults: Faults, act: Any, scene: Any) -> str | None:
-    """Key of the term whose commands the actions are; None for demands."""
+    """Key of the term that takes the actions as commands; None if actions are demands."""
     able = [term.key for term in scene.terms if term.channels]
     if act == "demand" or act in able:
         return None if act == "demand" else str(act)
@@ -453,7 +455,7 @@ def _actuator(faults: Faults, act: Any, scene: Any) -> str | None:
 
 
 def _acted(fleet: Ensemble, names: Sequence[str], to: str | None) -> Ensemble:
-    """The same members, on which actions act."""
+    """The same members, with the callback that applies the actions."""
     scene: Any = fleet.scene
     controller = scene.controller
     channels = {term.key: term.channels for term in scene.terms}
@@ -468,7 +470,7 @@ def _wishes(controller: Any) -> tuple[str, ...]:
 
 
 def _endless(fleet: Ensemble) -> bool:
-    """Whether there are as many members as one asks for: they are drawn at random, and all of them are meant."""
+    """Whether any number of members can be drawn: they are drawn at random, and the user has not selected some of them."""
     every = np.array_equal(fleet.indices, np.arange(fleet.members))
     return fleet.sampling.kind == "random" and not fleet.explicit() and every
 

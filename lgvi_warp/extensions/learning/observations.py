@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Observations of a learner.
 
-Names for numbers that a controller measures and wants, those of `lw.control.Policy` among them.
+Names of measured and wanted numbers of a controller, including the inputs of `lw.control.Policy`.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from lgvi_warp.scene.ensemble import Ensemble
 
 
 def heading_error(y: CallbackInput, r: CallbackInput) -> np.ndarray:
-    """The wanted heading less the measured one.
+    """The wanted minus the measured heading.
 
-    Returns: (m,) [rad], in (-pi, pi], from the forward axes, without Euler angles.
+    Returns: (m,) [rad], in (-pi, pi], computed from the forward axes, without Euler angles.
     """
     s, c = r.attitude[:, :2, 0], y.attitude[:, :2, 0]
     return np.arctan2(s[:, 1] * c[:, 0] - s[:, 0] * c[:, 1], s[:, 0] * c[:, 0] + s[:, 1] * c[:, 1])
@@ -34,7 +34,7 @@ def attitude_error(y: CallbackInput, r: CallbackInput) -> np.ndarray:
 
 
 def position_error(y: CallbackInput, r: CallbackInput) -> np.ndarray:
-    """The wanted position less the measured one, (m, 3) [m], body axes."""
+    """The wanted minus the measured position, (m, 3) [m], body axes."""
     return np.einsum("nji,nj->ni", y.attitude, r.position - y.position)
 
 
@@ -45,11 +45,11 @@ def water_velocity(y: CallbackInput) -> np.ndarray:
 
 
 class ObservedNumber(NamedTuple):
-    """A number, or several, that a learner may see.
+    """One or several numbers that a learner may observe.
 
-    wish: What guidance must give for it; None for nothing.
+    wish: Quantity that guidance must set for this observation; None for no quantity.
     of: Function of the measured and the wanted motion of m members that returns (m,) or (m, length).
-    most: The largest that each number can be, by what it is; infinite by default.
+    most: Largest size of each number that its definition allows; infinite by default.
     """
 
     length: int
@@ -91,10 +91,10 @@ _PLACES = {"depth": (2,), "measured_depth": (2,), "measured_position": (0, 1, 2)
 
 
 def bounds(names: Sequence[str], fleet: Ensemble) -> np.ndarray | None:
-    """The least and the largest that named numbers can be, (2, k); None where none of them has a bound.
+    """Least and largest values of named numbers, (2, k); None if none of them has a bound.
 
-    Angles and numbers of rotations have one by what they are. Depth and position have those at which events of the scene stop
-    a vehicle, where it measures them as they are.
+    Angles and numbers of rotations are bounded by definition. Depth and position are bounded if events of the scene stop the
+    vehicle at bounds and they are measured without error.
     """
     corners, columns = _sea(fleet), []
     for entry in names:
@@ -109,7 +109,7 @@ def bounds(names: Sequence[str], fleet: Ensemble) -> np.ndarray | None:
 
 
 def _sea(fleet: Ensemble) -> np.ndarray:
-    """The corners (2, 3) [m] between which all members are measured; infinite where nothing says so."""
+    """Corners (2, 3) [m] of the box within which all members measure their position; infinite without a bound."""
     low, high = np.full(3, -np.inf), np.full(3, np.inf)
     controller: Any = fleet.scene.controller
     if controller.sensors or controller.faults:
@@ -129,7 +129,7 @@ def _sea(fleet: Ensemble) -> np.ndarray:
 def observer(
     faults: Faults, names: Any, wishes: Sequence[str]
 ) -> Callable[[float, CallbackInput, CallbackInput], np.ndarray]:
-    """A function of the time and of the measured and wanted motion of m members that gathers named numbers (m, k)."""
+    """A function of the time and of the measured and wanted motion of m members that returns named numbers (m, k)."""
     chosen: list[tuple[ObservedNumber, int | None]] = []
     known: Mapping[str, tuple[str, int | None]] = {
         (name if i is None else f"{name}[{i}]"): (name, i)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`lw.gym.sb3`: a vector environment as the `VecEnv` of Stable-Baselines3, whose learners take that alone."""
+"""`lw.gym.sb3`: a vector environment as a `VecEnv`, the only type that learners of Stable-Baselines3 accept."""
 
 from __future__ import annotations
 
@@ -19,21 +19,22 @@ Indices = int | Iterable[int] | None
 
 
 def sb3(env: Vehicles) -> Any:
-    """Return a vector environment as the `VecEnv` that learners of Stable-Baselines3 take.
+    """Convert a vector environment to a `VecEnv`, the type that learners of Stable-Baselines3 accept.
 
-    If an episode ends, the step returns the first observation of the next one, whatever the autoreset of `env`. In infos[i],
-    "terminal_observation" is the last observation of the episode, "TimeLimit.truncated" says whether only its time was up,
-    and "status" why the vehicle ended by itself. The environment is shared, not copied: use one of the two.
+    When an episode ends, the step returns the first observation of the next episode, whatever the autoreset mode of `env`.
+    In infos[i], "terminal_observation" is the last observation of the ended episode. "TimeLimit.truncated" is True if the
+    episode ended only because of its duration. "status" is the vehicle's status if it failed or an event stopped it. The
+    environment is shared, not copied: use either `env` or the result, not both.
 
     Args:
         env: The environment, an `lw.gym.VectorEnv` with bounds of its actions.
 
     Returns:
-        stable_baselines3.common.vec_env.VecEnv of env.num_envs environments, with their spaces. `seed(s)` makes the next
-        `reset()` draw by the seed s, one for all. Rewards are float32 (num_envs,).
+        stable_baselines3.common.vec_env.VecEnv of env.num_envs environments, with their spaces. After `seed(s)`, the next
+        `reset()` uses the seed s for all environments. Rewards are float32 (num_envs,).
 
     Raises:
-        SceneError: If `env` is something else, or its actions have no bounds.
+        SceneError: If `env` is not an `lw.gym.VectorEnv`, or its actions have no bounds.
         MissingExtra: If Stable-Baselines3 is not installed.
 
     Examples:
@@ -57,7 +58,7 @@ def sb3(env: Vehicles) -> Any:
 
 
 class Baselines:
-    """A `VecEnv` over a vector environment, all of whose vehicles share their attributes."""
+    """A `VecEnv` that wraps a vector environment; all its vehicles share the environment's attributes."""
 
     num_envs: int
     _seeds: list[int | None]
@@ -75,7 +76,7 @@ class Baselines:
             Their first observations (num_envs, k).
 
         Raises:
-            ValueError: If options were set, of which there are none.
+            ValueError: If options were set, since there are no options.
         """
         if any(self._options):
             raise ValueError(f"options = {self._options[0]}: there are none to set. Vary the ensemble")
@@ -85,7 +86,7 @@ class Baselines:
         return observed
 
     def step_async(self, actions: np.ndarray) -> None:
-        """Keep the actions of a step.
+        """Store the actions of the next step.
 
         Args:
             actions: (num_envs, n).
@@ -93,13 +94,13 @@ class Baselines:
         self._asked = np.array(actions)
 
     def step_wait(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[dict[str, Any]]]:
-        """Make the step of `step_async`.
+        """Do the step whose actions `step_async` stored.
 
         Returns:
-            (observations, rewards, where episodes ended, infos); infos are empty but for those that ended.
+            (observations, rewards, mask of ended episodes, infos); infos of environments under way are empty.
 
         Raises:
-            RuntimeError: Without `step_async` before.
+            RuntimeError: If `step_async` was not called before.
         """
         if self._asked is None:
             raise RuntimeError("step_wait: no step was begun. Call step_async(actions) first")
@@ -116,10 +117,10 @@ class Baselines:
         return observed, rewards.astype(np.float32), done, each
 
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
-        """Draw by a seed from the next `reset` on.
+        """Set the seed of draws from the next `reset` on.
 
         Args:
-            seed: One for all environments; None, the default, for one that NumPy's global generator draws.
+            seed: One seed for all environments; None, the default, draws one from NumPy's global generator.
 
         Returns:
             The seed, once for each environment.
@@ -129,18 +130,18 @@ class Baselines:
         return self._seeds
 
     def close(self) -> None:
-        """Close the environment; again does nothing."""
+        """Close the environment; a second call does nothing."""
         self.env.close()
 
     def get_attr(self, attr_name: str, indices: Indices = None) -> list[Any]:
-        """Look an attribute of the environment up.
+        """Get an attribute of the environment.
 
         Args:
-            attr_name: Its name.
-            indices: Of which environments; None, the default, for all.
+            attr_name: Name of the attribute.
+            indices: Indices of environments; None, the default, for all.
 
         Returns:
-            Its value, once for each; of an array with a row for each environment, that row.
+            The value, once for each environment. Of an array with one row for each environment, the environment's row.
         """
         return self._of_each(getattr(self.env, attr_name), indices)
 
@@ -148,12 +149,12 @@ class Baselines:
         """Set an attribute of the environment, for all vehicles.
 
         Args:
-            attr_name: Its name.
-            value: Its value.
-            indices: All environments; None, the default, says so.
+            attr_name: Name of the attribute.
+            value: New value.
+            indices: Indices of all environments; None, the default, stands for all.
 
         Raises:
-            ValueError: If only some environments are named.
+            ValueError: If `indices` names only some environments.
         """
         if set(self._chosen(indices)) != set(range(self.num_envs)):
             raise ValueError(f"indices = {indices}: all environments share their attributes. Leave it out")
@@ -165,30 +166,30 @@ class Baselines:
         """Call a method of the environment once, for all vehicles.
 
         Args:
-            method_name: Its name.
-            method_args: What it is called with.
-            indices: Whose answers are wanted; None, the default, for all.
-            method_kwargs: What it is called with, by name.
+            method_name: Name of the method.
+            method_args: Positional arguments of the call.
+            indices: Indices of the environments whose answers are returned; None, the default, for all.
+            method_kwargs: Keyword arguments of the call.
 
         Returns:
-            Its answer, once for each; of an array with a row for each environment, that row.
+            The answer, once for each environment. Of an array with one row for each environment, the environment's row.
         """
         return self._of_each(getattr(self.env, method_name)(*method_args, **method_kwargs), indices)
 
     def env_is_wrapped(self, wrapper_class: type, indices: Indices = None) -> list[bool]:
-        """Say whether environments are wrapped: none is.
+        """Return whether environments are wrapped by a class; none is.
 
         Args:
             wrapper_class: Class of a wrapper.
-            indices: Of which environments; None, the default, for all.
+            indices: Indices of environments; None, the default, for all.
 
         Returns:
-            False for each.
+            False for each environment.
         """
         return [False for _ in self._chosen(indices)]
 
     def get_images(self) -> list[None]:
-        """Say that there are no images: `lw.record` shows the vehicles of a run.
+        """Return no images; use `lw.record` to show the vehicles of a run.
 
         Returns:
             None for each environment.
@@ -205,7 +206,7 @@ class Baselines:
         return [value[i] if by_row else value for i in self._chosen(indices)]
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle the environment: the copy has not begun."""
+        """Pickle the environment; the copy is a new environment that has not begun."""
         return sb3, (self.env,)
 
 
@@ -220,5 +221,5 @@ def needed() -> type:
 
 @functools.cache
 def _vec_env(base: type) -> type:
-    """`Baselines` as a class of Stable-Baselines3's, made when it is used first: that may be absent."""
+    """`Baselines` as a subclass of `VecEnv`, created at its first use, since Stable-Baselines3 may be absent."""
     return type("SB3VecEnv", (Baselines, base), {"__doc__": Baselines.__doc__, "__module__": __name__})

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Inertial navigation: an IMU, a log, an error-state filter, and tests of its consistency."""
+"""Inertial navigation: an IMU, a Doppler velocity log, an error-state Kalman filter, and tests of its consistency."""
 
 # Where the device code of the parts is.
 DEVICE = f"{__name__}.device"

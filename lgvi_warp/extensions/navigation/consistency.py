@@ -18,13 +18,13 @@ NEEDED = ("nees", "nis", "nis_count")
 
 
 class TimeAverage(NamedTuple):
-    """The mean over all members and times, beside that of a consistent filter.
+    """Test of a mean over all members and times against that of a consistent filter.
 
     Attributes:
-        mean: That mean; NaN where there is nothing to average.
-        degrees: Degrees of freedom of one value, the mean of a consistent filter times their number.
-        effective: How many independent values the mean is worth.
-        p: Probability of a mean as far off, either way, for a consistent filter; NaN without a mean.
+        mean: Mean over all members and times; NaN if there are no values.
+        degrees: Degrees of freedom of one value. A consistent filter has this mean.
+        effective: Effective sample size, the number of independent values with the same information.
+        p: Two-sided p-value: probability of a mean at least as far off for a consistent filter; NaN without a mean.
     """
 
     mean: float
@@ -39,16 +39,16 @@ class Consistency(Summarized):
 
     Attributes:
         time: Times of the samples (k,) [s].
-        members: Members that were still under way (k,).
-        nees: Mean over the members of e^T P^-1 e, 15 for a consistent filter (k,); NaN where a filter's covariance lost its
-            digits.
-        nees_band: Lower and upper end of its band (k, 2).
-        nis: Sum of squared innovations over their variances, by their number, 1 for a consistent filter (k,); NaN where
-            none was.
-        nis_band: Lower and upper end of its band (k, 2); NaN where none was.
-        level: Probability of each band.
+        members: Number of members still under way (k,).
+        nees: Mean over the members of e^T P^-1 e (k,), 15 for a consistent filter; NaN if round-off spoils a filter's
+            covariance.
+        nees_band: Lower and upper end of the band of `nees` (k, 2).
+        nis: Mean of squared innovations divided by their variances (k,), 1 for a consistent filter; NaN at times without
+            innovations.
+        nis_band: Lower and upper end of the band of `nis` (k, 2); NaN at times without innovations.
+        level: Probability that a consistent filter is inside its band at a time.
         nees_average: Test of the mean of NEES over members and times, with its effective sample size and its p-value.
-        nis_average: The same of NIS, whose innovations are independent of one another for a consistent filter.
+        nis_average: Test of the mean of NIS; the innovations of a consistent filter are independent of one another.
     """
 
     time: np.ndarray
@@ -63,9 +63,9 @@ class Consistency(Summarized):
 
     @property
     def verdict(self) -> str:
-        """One of "consistent", "too sure", with errors or innovations larger than believed, "too careful" and "unknown".
+        """Verdict of the tests: "consistent", "too sure" (errors larger than predicted), "too careful" or "unknown".
 
-        By the p-values of both averages, of which each has to be at least half of 1 - level (Bonferroni).
+        A filter is consistent if the p-values of both averages are at least half of 1 - level (Bonferroni).
         """
         tests = [test for test in (self.nees_average, self.nis_average) if np.isfinite(test.p)]
         worst = min(tests, key=lambda test: test.p, default=None)
@@ -92,12 +92,12 @@ class Consistency(Summarized):
 
     @property
     def nees_share(self) -> float:
-        """Share of the times at which NEES is in its band."""
+        """Fraction of the times at which NEES is in its band."""
         return _share(self.nees, self.nees_band)
 
     @property
     def nis_share(self) -> float:
-        """Share of the times with innovations at which NIS is in its band."""
+        """Fraction of the times with innovations at which NIS is in its band."""
         return _share(self.nis, self.nis_band)
 
     def summary_rows(self) -> tuple[str, Rows]:
@@ -123,24 +123,24 @@ class Consistency(Summarized):
 def consistency(result: Any, level: float = 0.95) -> Consistency:
     """Test whether the filters of an ensemble are consistent: chi-square tests of NEES and NIS at each time.
 
-    A filter is consistent where its errors are as large as its covariance says. Then NEES, e^T P^-1 e by the truth, has 15
-    degrees of freedom, and the squared innovations over their variances (NIS) have one each, if the model is linear and the
-    noise is normal; members are independent, so sums over them have as many times these. Bar-Shalom, Li & Kirubarajan (2001),
-    *Estimation with Applications to Tracking and Navigation*, section 5.4. Errors of one member at two times are not
-    independent: one ensemble may be outside its NEES band for long, by chance, so that the share of the times in the band
-    is no test. The mean over all times is a test: its effective sample size is the number of values over 1 + 2 times
-    the sum of their autocorrelations, and the sum of that many values of a consistent filter has a chi-square
-    distribution.
+    A filter is consistent if its errors have the size that its covariance predicts. If in addition the model is linear and
+    the noise is normal, NEES = e^T P^-1 e, with the true error e, has a chi-square distribution with 15 degrees of freedom.
+    Each squared innovation divided by its variance (NIS) has one degree of freedom. Members are independent, so the degrees
+    of freedom of sums over members add up (Bar-Shalom, Li & Kirubarajan 2001, *Estimation with Applications to Tracking and
+    Navigation*, section 5.4). Errors of one member at two times are not independent, so an ensemble may by chance be
+    outside its NEES band for long. The fraction of the times in the band is therefore not a test; the mean over all times
+    is tested instead. Its effective sample size is the number of values divided by 1 + 2 times the sum of their
+    autocorrelations. The sum of that many values of a consistent filter has a chi-square distribution.
 
     Args:
         result: Result of a run with an `lw.control.ErrorStateFilter` that saved "nees", "nis" and "nis_count".
-        level: Probability of each band, in (0, 1); 0.95 by default.
+        level: Probability that a consistent filter is inside its band at a time, in (0, 1); 0.95 by default.
 
     Returns:
-        The means and their bands, by time, and the tests of the means over all times.
+        The means and their bands at each time, and the tests of the means over all times.
 
     Raises:
-        SceneError: If the result lacks these samples, or the level is not in (0, 1).
+        SceneError: If the result lacks these samples, or `level` is not in (0, 1).
 
     Examples:
         >>> import lgvi_warp as lw
@@ -177,7 +177,7 @@ def consistency(result: Any, level: float = 0.95) -> Consistency:
 
 
 def time_average(nees: np.ndarray) -> TimeAverage:
-    """The test of NEES (k, n) of n members at k times; NaN where there is none."""
+    """The test of NEES (k, n) of n members at k times; missing values are NaN."""
     known = np.isfinite(nees)
     count = int(known.sum())
     if not count or not known.any(axis=0).all():
@@ -197,7 +197,7 @@ def time_average(nees: np.ndarray) -> TimeAverage:
 
 
 def _mean_test(total: float, count: float, degrees: float, effective: float) -> TimeAverage:
-    """The test of the mean of some values, whose sum is `total`, each of chi-square with these degrees of freedom."""
+    """The test of the mean of `count` values with the sum `total`, each chi-square distributed with `degrees`."""
     from scipy.stats import chi2
 
     if not (count > 0.0 and np.isfinite(total)):
@@ -209,7 +209,7 @@ def _mean_test(total: float, count: float, degrees: float, effective: float) -> 
 
 
 def _share(values: np.ndarray, band: np.ndarray) -> float:
-    """The share of those that have a band and are in it, which NaN is not; NaN for none."""
+    """Fraction of the values with a band that lie in it; NaN counts as outside. NaN if no value has a band."""
     known = np.isfinite(band).all(axis=1)
     inside = (values >= band[:, 0]) & (values <= band[:, 1])
     return float(inside[known].mean()) if known.any() else np.nan

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Events of what a filter believes."""
+"""Events that depend on the covariance of a navigation filter."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from lgvi_warp.physics.terms.events import Event
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PositionUncertain(Event):
-    """Stop a member at the tick at which its filter knows the position less well than a limit.
+    """Stop a member at the tick at which the standard deviation of its filter's position exceeds a limit.
 
-    The standard deviation of the position is sqrt(s_n^2 + s_e^2 + s_d^2), of the first three numbers of the signal
-    "estimate_sigma". The signal need not be kept: a filter with `report = false` works, too.
+    The standard deviation of the position is sqrt(s_n^2 + s_e^2 + s_d^2), where s_n, s_e and s_d are the first three numbers
+    of the signal "estimate_sigma". The signal need not be saved: a filter with `report = false` works, too.
 
     Args:
-        sigma: Limit of the standard deviation of the position [m].
+        sigma: Largest standard deviation of the position [m].
         filter: Name of the filter, an `lw.control.ErrorStateFilter`; "error_state_filter" by default.
 
     Raises:
-        SceneError: When a scene is built that has no such filter; or a number is invalid (see `Term`).
+        SceneError: If a number is invalid (see `Term`). A scene refuses the event if it has no such filter.
 
     Examples:
         >>> import lgvi_warp as lw

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Metrics of what a filter believes: whether its errors and innovations are as large as it says."""
+"""Metrics of a navigation filter: whether its errors and innovations have the size that its covariance predicts."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from lgvi_warp.statistics.values.quantity import Quantity
 
 @dataclass(frozen=True, eq=False)
 class OfFilter(Metric):
-    """A metric of what an `lw.control.ErrorStateFilter` believes. Abstract."""
+    """Base class of metrics of an `lw.control.ErrorStateFilter`. Abstract."""
 
     def meant(self) -> Quantity:
         if not among(self.of, (self.default,)):
@@ -26,10 +26,10 @@ class OfFilter(Metric):
 
 @dataclass(frozen=True, eq=False)
 class NEES(OfFilter):
-    """The mean over a member's ticks of e^T P^-1 e, its filter's squared error by the truth; then statistics over members.
+    """Mean over a member's ticks of e^T P^-1 e, the filter's normalised squared error; then statistics over members.
 
-    It is 15 on average for a consistent filter, which has 15 states. Errors of one member at two ticks are not independent:
-    use `lw.metrics.consistency` for a test over members. The filter needs report=True.
+    Its expected value is 15 for a consistent filter, which has 15 states. Errors of one member at two ticks are not
+    independent, so use `lw.metrics.consistency` for a test over members. The filter needs report=True.
 
     Args:
         of: "nees", the default.
@@ -56,10 +56,10 @@ class NEES(OfFilter):
 
 @dataclass(frozen=True, eq=False)
 class NIS(NEES):
-    """Mean over all readings that a member's filter took of innovation^2 over its variance; then statistics over members.
+    """Mean of innovation^2 / variance over all readings that a member's filter accepted; then statistics over members.
 
-    It is 1 on average for a consistent filter, and NaN for one that took none. Unlike `NEES` it needs no truth: a vehicle
-    at sea can compute it. The filter needs report=True.
+    Its expected value is 1 for a consistent filter. It is NaN if the filter accepted no reading. Unlike `NEES` it does not
+    need the true state, so a vehicle at sea can compute it. The filter needs report=True.
 
     Args:
         of: "nis", the default.
@@ -80,10 +80,10 @@ class NIS(NEES):
 
 @dataclass(frozen=True, eq=False)
 class Rejected(OfFilter):
-    """The number of readings that the gate of a member's filter has rejected by the end; then statistics over members.
+    """Number of readings that the gate of a member's filter has rejected by the end; then statistics over members.
 
-    Every number of a reading counts separately, such as a beam or a coordinate of a fix, summed over all sensors. The
-    signal "rejected" has the counts by sensor. The filter needs a gate and report=True.
+    Every number of a reading counts separately, such as a beam or a coordinate of a fix. The counts of all sensors are
+    added; the signal "rejected" has the count of each sensor. The filter needs a gate and report=True.
 
     Args:
         of: "rejected", the default.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Estimates of the filter: rows of the bus, as device/error_state_filter.py writes them."""
+"""Signals of the filter's estimates, from the rows of the bus that device/error_state_filter.py writes."""
 
 from lgvi_warp.control.signals import ESTIMATE, REJECTED, Signal, add_signals
 from lgvi_warp.physics.fields import Field

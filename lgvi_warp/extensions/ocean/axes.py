@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The axes of a variable of a data set: which dimension is latitude, longitude, depth, time or scenario, and its numbers."""
+"""The axes of a variable of a data set: its dimensions for latitude, longitude, depth, time and scenario, with values."""
 
 from __future__ import annotations
 
@@ -42,12 +42,12 @@ NO_NUMBER = 0.99e20
 
 @dataclass(frozen=True, eq=False)
 class Axes:
-    """Dimensions of a variable by part: "scenario", "time", "depth", "y", "x"; and coordinates as the file orders them.
+    """Dimensions of a variable by role, "scenario", "time", "depth", "y", "x", and its coordinates in the file's order.
 
-    latitude, longitude [deg]: (y,) and (x,), or (y, x), NaN at nodes without a place. With a `projection` and of one dimension
-    they are its y and x [m, or deg]. depth [m], positive downward (k,); None without, and for levels that follow the ground
-    (`s_levels`, the name of their dimension). time (t,): datetime64[ns], moments of another calendar (objects of cftime), or
-    timedelta64[ns], counted from no moment; or None.
+    latitude, longitude [deg]: (y,) and (x,), or (y, x), NaN at nodes without a position. One-dimensional axes of a
+    `projection` are its y and x [m, or deg]. depth [m]: Positive downward (k,); None without depth, and for levels that follow
+    the ground (`s_levels`, the name of their dimension). time (t,): datetime64[ns], dates of another calendar (objects of
+    cftime), timedelta64[ns] without a reference date, or None.
     """
 
     dims: Mapping[str, Hashable]
@@ -85,7 +85,7 @@ def axes_of(ds: Any, name: str) -> Axes:
 
 
 def elapsed(time: np.ndarray, since: Any = None) -> np.ndarray:
-    """Times [s] since a moment of the same calendar; by default since the first."""
+    """Times [s] since a date of the same calendar; by default since the first time."""
     differences = time - (time[0] if since is None else since)
     if time.dtype.kind == "O":
         return np.array([one / datetime.timedelta(seconds=1) for one in differences])
@@ -93,17 +93,17 @@ def elapsed(time: np.ndarray, since: Any = None) -> np.ndarray:
 
 
 def _word(coordinate: Any, attribute: str) -> str:
-    """An attribute in lower case; "" where it is missing."""
+    """An attribute in lower case; "" if it is missing."""
     return str(coordinate.attrs.get(attribute, "")).strip().lower()
 
 
 def _attribute(variable: Any, attribute: str) -> str:
-    """An attribute that xarray may have read and put aside (CF 1.11, section 5)."""
+    """An attribute that xarray may have moved to the encoding (CF 1.11, section 5)."""
     return str(variable.attrs.get(attribute, variable.encoding.get(attribute, "")))
 
 
 def _along(coordinates: Mapping[str, Any], dim: Hashable | None, fits: Callable[[str, Any], bool]) -> tuple[bool, Any]:
-    """Whether a dimension fits, and its coordinate: of its own name, or the first other one along it alone that fits."""
+    """Whether a dimension fits, and its coordinate: the one of its name, or else the first that fits along only it."""
     own = coordinates.get(str(dim))
     if own is not None and own.dims == (dim,):
         return fits(str(dim), own), own
@@ -159,14 +159,14 @@ def _grid(
 
 
 def _mapping(*variables: Any) -> str:
-    """The name of a grid mapping that a variable or its axes say; of the longer form the first (CF 1.11, section 5.6)."""
+    """The grid mapping that a variable or its axes name, the first in the extended form (CF 1.11, section 5.6)."""
     return next(
         (text.split(":")[0].split()[0] for v in variables if (text := _attribute(v, "grid_mapping")).strip()), ""
     )
 
 
 def _projection(ds: Any, name: str, mapped: str) -> Projection:
-    """The projection of a grid mapping: a variable of the file, or the number of a system as "EPSG:32631"."""
+    """The projection of a grid mapping: a variable of the file, or the code of a system such as "EPSG:32631"."""
     if mapped in ds.variables:
         return projection(mapped, ds[mapped].attrs)
     if mapped.upper() == "EPSG":
@@ -176,7 +176,7 @@ def _projection(ds: Any, name: str, mapped: str) -> Projection:
 
 
 def _metres(name: str, axis: Any, plane: Projection) -> np.ndarray:
-    """Numbers of an axis of a projection [m]; of one about another pole [deg]."""
+    """Values of an axis of a projection [m], or [deg] for a rotated pole."""
     where, unit = str(axis.name), _word(axis, "units")
     if axis.size > MOST_PLACES:
         raise refusal(
@@ -193,9 +193,9 @@ def _metres(name: str, axis: Any, plane: Projection) -> np.ndarray:
 
 
 def _without_places(latitude: np.ndarray, longitude: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The same, of two dimensions NaN for nodes without a place: those of a model's processors on land, and of dry cells.
+    """Coordinates, of two-dimensional ones with NaN at nodes without a position, on land or in dry cells.
 
-    Writers leave them out, or as zeros: more than one node at 0, 0 is none.
+    Some models write missing values at these nodes, others zeros: if several nodes are at 0, 0, none has a position.
     """
     if latitude.ndim == 1:
         return latitude, longitude
@@ -205,7 +205,7 @@ def _without_places(latitude: np.ndarray, longitude: np.ndarray) -> tuple[np.nda
 
 
 def _first(coordinates: Mapping[str, Any], named: list[str], words: tuple[str, ...]) -> Any:
-    """The first coordinate with one of these standard names, of those that a variable names, else of all; None without."""
+    """The first coordinate with one of these standard names, among those that the variable names, then all; or None."""
     own = [coordinates[word] for word in named if word in coordinates]
     return next((c for c in (*own, *coordinates.values()) if _word(c, "standard_name") in words), None)
 
@@ -213,7 +213,7 @@ def _first(coordinates: Mapping[str, Any], named: list[str], words: tuple[str, .
 def _place(
     name: str, coordinates: Mapping[str, Any], named: list[str], standard: Any, units: Any, names: Any, meaning: str
 ) -> Any:
-    """The coordinate that is the latitude or the longitude of a variable: of those that it names itself, else of all."""
+    """The latitude or longitude of a variable: among the coordinates that it names itself, then among all; or None."""
     tests: tuple[Callable[[str, Any], bool], ...] = (
         lambda _, c: _word(c, "standard_name") in standard,
         lambda _, c: _word(c, "units") in units,
@@ -265,7 +265,7 @@ def _is_scenario(dim: str, c: Any) -> bool:
 
 
 def _degrees(name: str, coordinate: Any, most: float) -> np.ndarray:
-    """The numbers of a latitude or a longitude [deg]."""
+    """The values of a latitude or a longitude [deg]."""
     where = f"{name}.{coordinate.name}"
     if coordinate.size > MOST_PLACES:
         raise refusal(
@@ -305,7 +305,7 @@ def _depths(name: str, dim: str, coordinate: Any) -> np.ndarray:
 
 
 def _times(name: str, dim: str, coordinate: Any) -> np.ndarray:
-    """Moments of the fields, or how long after the first they are where the file counts from no moment."""
+    """Dates of the fields, or durations if the file has no reference date."""
     where = f"{name}.{dim}"
     values = None if coordinate is None else np.asarray(coordinate.values)
     unit = "" if coordinate is None else _word(coordinate, "units")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Variables of data sets of the CF conventions on latitudes and longitudes: found, and read part by part in SI units."""
+"""Variables of data sets in the CF conventions: search for them, and read parts of them in SI units."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ MOST_OF_STEP = 3.0
 
 @dataclass(frozen=True)
 class OceanQuantity:
-    """Names of an ocean variable: its standard_name in the CF conventions, or the name that models give it."""
+    """Names of an ocean variable: its standard_name in the CF conventions, or the names used by models."""
 
     meaning: str
     standard_names: tuple[str, ...]
@@ -67,22 +67,22 @@ ELEVATION = OceanQuantity(
 
 @dataclass(frozen=True, eq=False)
 class Gridded:
-    """A variable of a data set on a grid, of which nothing is read until `values` is called.
+    """A variable of a data set on a grid; its values are not read until `values` is called.
 
     Attributes:
-        name: Its name in the data set.
-        pieces: The variable as xarray has it, lazily; several pieces stand side by side along x, across the date line.
-        scale: What its numbers are multiplied by to be in SI units, and positive downward where it is a depth.
-        latitude, longitude: Of the nodes [deg], (y,) and (x,), rising, or (y, x) each; longitudes may pass 180.
-        depth: Of the levels [m], rising, positive downward, (k,); None for a variable without.
-        time: Of the fields, datetime64[ns] (t,), rising; None for a variable without.
-        dims: Name of the dimension by its part in `ORDER`.
-        scenarios: How many; 1 for a variable without.
-        s_levels: Depths of levels that follow the sea floor; None for others.
-        projection: Plane of the axes y and x [m], which then stand in place of latitudes and longitudes where they are of one
-            dimension, and along which velocities are; None for others.
-        land: Mask of nodes (y, x) that are on land or have no place; None where the file tells none.
-        angle: Angle [rad] (y, x) from the east to the grid's x, to the left; None where the file tells none.
+        name: Name of the variable in the data set.
+        pieces: Lazy xarray variable, in several pieces side by side along x if the grid crosses the date line.
+        scale: Factor from the file's numbers to SI units; it also makes depths positive downward.
+        latitude, longitude: Coordinates of the nodes [deg], (y,) and (x,), rising, or (y, x) each; longitudes may pass 180.
+        depth: Depths of the levels [m], rising, positive downward, (k,); None for a variable without depth.
+        time: Times of the fields, datetime64[ns] (t,), rising; None for a variable without time.
+        dims: {role in `ORDER`: name of the dimension}.
+        scenarios: Number of scenarios; 1 for a variable without them.
+        s_levels: Depths of levels that follow the sea floor; None for other levels.
+        projection: Plane of the axes y and x [m]; None for others. One-dimensional axes then replace latitudes and longitudes,
+            and velocities are along the axes.
+        land: Mask of nodes (y, x) that are on land or have no position; None if the file has no mask.
+        angle: Angle [rad] (y, x) from east to the grid's x, counterclockwise; None if the file has none.
     """
 
     name: str
@@ -101,23 +101,23 @@ class Gridded:
 
     @property
     def rectilinear(self) -> bool:
-        """Whether latitude and longitude, or y and x of a projection, are axes of the grid."""
+        """Whether the axes of the grid are latitude and longitude, or y and x of a projection."""
         return self.latitude.ndim == 1
 
     @property
     def turned(self) -> bool:
-        """Whether its axes are others than those of latitude and longitude."""
+        """Whether the grid's axes differ from latitude and longitude."""
         return not self.rectilinear or self.projection is not None
 
     def places(self) -> tuple[np.ndarray, np.ndarray]:
-        """Latitudes and longitudes [deg] of the nodes (y, x), NaN for those without a place."""
+        """Latitudes and longitudes [deg] of the nodes (y, x); NaN for nodes without a position."""
         if not self.rectilinear:
             return self.latitude, self.longitude
         y, x = np.meshgrid(self.latitude, self.longitude, indexing="ij")
         return (y, x) if self.projection is None else self.projection.geodetic(x, y)
 
     def extent(self, latitude: np.ndarray, longitude: np.ndarray) -> tuple[float, float, float, float]:
-        """Box around places [deg] for `between`."""
+        """Box around points [deg], for `between`."""
         y, x = latitude, longitude
         if self.rectilinear and self.projection is not None:
             x, y = self.projection.plane(latitude, longitude)
@@ -133,7 +133,7 @@ class Gridded:
         )
 
     def values(self, scenario: int = 0, time: int = 0) -> np.ndarray:
-        """One field (k, y, x), float64, NaN where values are missing; k is 1 for a variable without depth."""
+        """One field (k, y, x), float64; missing values are NaN, and k is 1 for a variable without depth."""
         at = {"scenario": scenario, "time": time}
         index = {self.dims[part]: at[part] for part in at if part in self.dims}
         parts = [np.asarray(piece.isel(index).values, dtype=np.float64) for piece in self.pieces]
@@ -144,7 +144,7 @@ class Gridded:
         return field if "depth" in self.dims else field[None]
 
     def between(self, south: float, north: float, west: float, east: float) -> Gridded:
-        """The part of the grid that covers a box and the nodes next to it, in its own axes: longitudes as it has them."""
+        """The part of the grid that covers a box and the nodes next to it; the box is in the grid's own axes."""
         rows, columns = _covering(self, south, north, west, east)
         pieces, first = [], 0
         for piece in self.pieces:
@@ -167,7 +167,7 @@ class Gridded:
         return dataclasses.replace(self, **changed)
 
     def levels(self, deepest: float) -> Gridded:
-        """The levels down to the first at a depth or below it [m]."""
+        """The grid with the levels down to the first one at or below a depth [m]."""
         if self.depth is None:
             return self
         kept = slice(0, min(int(np.searchsorted(self.depth, deepest)) + 1, len(self.depth)))
@@ -176,7 +176,7 @@ class Gridded:
 
 
 def variable_name(ds: Any, quantity: OceanQuantity, named: str | None = None) -> str | None:
-    """The name of the variable that holds a quantity; None where there is none."""
+    """The name of the variable that holds a quantity; None if there is no such variable."""
     if named is not None:
         if named in ds.encoding.get("damaged", {}):
             raise refusal(
@@ -200,7 +200,7 @@ def variable_name(ds: Any, quantity: OceanQuantity, named: str | None = None) ->
 
 
 def missing(ds: Any, quantities: Iterable[OceanQuantity]) -> SceneError:
-    """The fault of a data set that has none of these."""
+    """The error for a data set that has none of these quantities."""
     names = " or ".join(quantity.standard_names[0] for quantity in quantities)
     present = ", ".join(map(str, ds.data_vars)) or "nothing"
     return refusal("variables", present[:60], "have no CF names that are known",
@@ -208,13 +208,13 @@ def missing(ds: Any, quantities: Iterable[OceanQuantity]) -> SceneError:
 
 
 def gridded(ds: Any, quantity: OceanQuantity, name: str, about: float | None = None) -> Gridded:
-    """A variable of a data set with its axes, lazily; longitudes rise and are within 180 degrees of `about`.
+    """A lazy variable of a data set with its axes; longitudes rise and are within 180 degrees of `about`.
 
     Args:
         ds: An xarray Dataset.
-        quantity: What the variable is.
-        name: The variable.
-        about: A longitude [deg]; None, the default, for that of the data set's first node.
+        quantity: Quantity that the variable holds.
+        name: Name of the variable.
+        about: A longitude [deg]; None, the default, for the longitude of the data set's first node.
     """
     ds = staggered.trimmed(ds)
     axes = axes_of(ds, name)
@@ -252,7 +252,7 @@ def gridded(ds: Any, quantity: OceanQuantity, name: str, about: float | None = N
 
 
 def says_along(ds: Any, name: str, quantity: OceanQuantity) -> bool:
-    """Whether a file says along what axis a velocity is: by its standard_name, or by names that one model alone gives."""
+    """Whether a file states the axis of a velocity, by its standard_name or by a name that only one model uses."""
     standard = str(ds[name].attrs.get("standard_name", "")).strip().lower()
     return (
         standard in quantity.standard_names
@@ -262,7 +262,7 @@ def says_along(ds: Any, name: str, quantity: OceanQuantity) -> bool:
 
 
 def seconds_since(time: np.ndarray, start: datetime.datetime | np.datetime64 | str | None) -> np.ndarray:
-    """Times [s] from `start`, in UTC where it names no zone, and in the file's calendar; from the first where it is None."""
+    """Times [s] from `start`, or from the first time for None, in the file's calendar; `start` is in UTC without a zone."""
     if start is None:
         return elapsed(time)
     first: Any = instant("start", start)
@@ -281,7 +281,7 @@ def seconds_since(time: np.ndarray, start: datetime.datetime | np.datetime64 | s
 
 
 def instant(key: str, value: Any) -> np.datetime64:
-    """A moment in UTC of a datetime, or of a text as ISO 8601 writes it."""
+    """The date and time in UTC of a datetime or of a text in ISO 8601."""
     try:
         text = value.strip().replace(" ", "T") if isinstance(value, str) else ""
         if text:
@@ -299,7 +299,7 @@ def instant(key: str, value: Any) -> np.datetime64:
 
 
 def _risen(ds: Any, name: str, axes: Axes) -> tuple[Any, Axes]:
-    """The data set with rows and columns along rising y and x, where a grid of two dimensions has such axes too."""
+    """The data set with rows and columns in rising order of y and x, if a two-dimensional grid also has such axes."""
     falling = [
         axes.dims[part]
         for part, words in PROJECTED.items()
@@ -313,7 +313,7 @@ def _risen(ds: Any, name: str, axes: Axes) -> tuple[Any, Axes]:
 
 
 def _ordered(variable: Any, axes: Axes) -> Any:
-    """The variable with its dimensions in `ORDER`, without others of size 1."""
+    """The variable with its dimensions in `ORDER`; other dimensions of size 1 are dropped."""
     known = [axes.dims[part] for part in ORDER if part in axes.dims]
     others = [dim for dim in variable.dims if dim not in known]
     for dim in others:
@@ -324,7 +324,7 @@ def _ordered(variable: Any, axes: Axes) -> Any:
 
 
 def _rising(where: str, values: np.ndarray, unit: str) -> slice:
-    """Slice that puts the values of an axis in rising order; SceneError where they neither rise nor fall."""
+    """Slice that puts the values of an axis in rising order. Raises SceneError if they neither rise nor fall."""
     steps = np.diff(values)
     if not (np.all(steps > 0.0) or np.all(steps < 0.0)):
         raise refusal(where, brief(values), "neither rises nor falls", f"sort it [{unit}] and drop repetitions")
@@ -332,7 +332,7 @@ def _rising(where: str, values: np.ndarray, unit: str) -> slice:
 
 
 def _places(name: str, axes: Axes, variable: Any, about: float) -> tuple[np.ndarray, np.ndarray, tuple[Any, ...]]:
-    """Latitudes and longitudes about a meridian, rising, and the pieces of the variable in that order."""
+    """Rising latitudes and longitudes, within 180 degrees of a meridian, and the pieces of the variable in that order."""
     y, x = axes.dims["y"], axes.dims["x"]
     if axes.latitude.ndim == 2:
         return axes.latitude, _about(axes.longitude, about), (variable,)
@@ -362,7 +362,7 @@ def _places(name: str, axes: Axes, variable: Any, about: float) -> tuple[np.ndar
 
 
 def _block(longitude: np.ndarray, about: float) -> tuple[int, int]:
-    """First and one past the last of the rising longitudes about a meridian, or next to it, without a gap between them."""
+    """First and one past the last index of the longitudes without a gap that contain or are next to a meridian."""
     steps = np.diff(longitude)
     gaps = np.flatnonzero(steps > MOST_OF_STEP * np.median(steps)) + 1 if len(steps) else steps.astype(int)
     ends = [0, *gaps.tolist(), len(longitude)]
@@ -371,12 +371,12 @@ def _block(longitude: np.ndarray, about: float) -> tuple[int, int]:
 
 
 def _about(longitude: np.ndarray, about: float) -> np.ndarray:
-    """The same meridians within 180 degrees of `about`."""
+    """The same meridians, as longitudes within 180 degrees of `about`."""
     return np.asarray((longitude - about + 180.0) % 360.0 - 180.0 + about)
 
 
 def _covering(grid: Gridded, south: float, north: float, west: float, east: float) -> tuple[slice, slice]:
-    """Rows and columns of the nodes in a box and next to it."""
+    """Slices of the rows and columns of the nodes in a box and next to it."""
     if grid.rectilinear:
         return _span(grid.latitude, south, north), _span(grid.longitude, west, east)
     inside = (grid.latitude >= south) & (grid.latitude <= north)
@@ -391,7 +391,7 @@ def _covering(grid: Gridded, south: float, north: float, west: float, east: floa
 
 
 def _span(nodes: np.ndarray, low: float, high: float) -> slice:
-    """The nodes from the last at `low` or before it to the first at `high` or after it, two at least where there are."""
+    """Slice from the last node at or before `low` to the first at or after `high`, with two nodes if there are two."""
     first = max(int(np.searchsorted(nodes, low, side="right")) - 1, 0)
     stop = min(int(np.searchsorted(nodes, high, side="left")) + 1, len(nodes))
     first = min(first, max(len(nodes) - 2, 0))

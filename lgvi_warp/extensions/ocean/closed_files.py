@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whether an HDF5 file is all there is: nothing in it may lead to another file, to a program, or to memory without end."""
+"""Check that an HDF5 file is self-contained: it must not refer to other files or programs, or need unbounded memory."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ FILTERS = range(1, 7)
 
 
 def leads_elsewhere(file: Any) -> str:
-    """Say what in an open h5py File is not in the file itself, or too large; "" where nothing is.
+    """Describe the first part of an open h5py File that lies outside the file or is too large; "" if there is none.
 
-    Every object that a link or an axis of a variable leads to is looked at, by what it says of itself: none is read.
+    The metadata of every object that a link or an axis of a variable leads to is checked; no data is read.
     """
     from h5py import Dataset, h5a, h5d, h5g, h5l, h5o, h5r, h5t
 
@@ -47,7 +47,7 @@ def leads_elsewhere(file: Any) -> str:
 
 
 def _stored_elsewhere(variable: Any) -> str:
-    """Say what of the numbers of a variable is not in the file itself, or too large."""
+    """Describe data of a variable that lie outside the file or are too large; "" if there are none."""
     from h5py import h5d, h5i
 
     name, stored = _text(h5i.get_name(variable)), variable.get_create_plist()
@@ -67,5 +67,5 @@ def _stored_elsewhere(variable: Any) -> str:
 
 
 def _text(name: bytes | None) -> str:
-    """Show a name."""
+    """A name as text."""
     return repr((name or b"?").decode("utf-8", "backslashreplace"))

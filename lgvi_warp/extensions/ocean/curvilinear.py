@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Coordinates of places in a grid of cells with four corners each, such as a turned or a curved grid.
+"""Fractional indices of points along y and x, in a grid of cells with four corners such as a rotated or a curved grid.
 
-How far along y and x.
+Newton's method inverts the bilinear map of the cells.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ MOST_STEPS = 60
 
 @dataclass(frozen=True, eq=False)
 class CurvedGrid:
-    """Nodes of a grid in metres to the north and the east, (y, x) each. known: mask of those that data stand at; None for all.
+    """Nodes of a grid in metres to the north and the east, (y, x) each. known: Mask of nodes with data; None for all nodes.
 
-    Places are looked for from cells between known nodes on.
+    The search for a point begins in a cell between known nodes.
     """
 
     north: np.ndarray
@@ -26,9 +26,9 @@ class CurvedGrid:
     known: np.ndarray | None = None
 
     def fractions(self, north: np.ndarray, east: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Numbers of the row and of the column (...) of places, with parts of a cell; beyond the grid too.
+        """Fractional row and column indices (...) of points, also beyond the grid.
 
-        A cell is bilinear in its corners. Newton's method, from the cell whose middle is nearest, goes from cell to cell.
+        A cell is bilinear in its corners. Newton's method begins in the cell with the nearest centre and may change cells.
         """
         places = np.stack([np.ravel(north), np.ravel(east)], axis=-1)
         row, column = self._nearest_cells(places)
@@ -47,7 +47,7 @@ class CurvedGrid:
         return at[:, 0].reshape(shape), at[:, 1].reshape(shape)
 
     def directions(self, axis: int) -> np.ndarray:
-        """Unit vectors (y, x, 2) at the nodes, to the north and the east, along which columns (1) or rows (0) are counted."""
+        """Unit vectors (y, x, 2), north and east, at the nodes along rising rows (axis 0) or columns (axis 1)."""
         along = np.stack([np.gradient(x, axis=axis) for x in (self.north, self.east)], axis=-1)
         return np.asarray(along / np.linalg.norm(along, axis=-1, keepdims=True))
 
@@ -63,7 +63,7 @@ class CurvedGrid:
         return row, column
 
     def _cells(self, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """First corner (n, 2) of the cell that a place is in or next to, and its corners (n, 2, 2, 2): y, x, coordinate."""
+        """First corner (n, 2) of the cell at or nearest to a point, and its corners (n, 2, 2, 2): y, x, coordinate."""
         most = np.array(self.north.shape) - 2
         cell = np.clip(np.floor(at).astype(int), 0, most)
         j, i = cell[:, 0], cell[:, 1]
@@ -73,7 +73,7 @@ class CurvedGrid:
 
 
 def _bilinear(corners: np.ndarray, part: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Places (n, 2) in cells, and their slopes (n, 2, 2) along y and along x."""
+    """Positions (n, 2) at fractions of cells, and their derivatives (n, 2, 2) along y and along x."""
     y, x = part[:, 0, None], part[:, 1, None]
     first, second = corners[:, 0], corners[:, 1]
     along_x = (first[:, 1] - first[:, 0], second[:, 1] - second[:, 0])

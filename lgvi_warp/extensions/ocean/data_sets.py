@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Data sets: files in NetCDF, opened so that only what is asked for is read, and nothing but the file."""
+"""Data sets: NetCDF files, opened so that only requested data are read, and no other file."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ REMEDY = "give the path of a NetCDF file, or an xarray Dataset"
 
 
 def xarray() -> Any:
-    """The library, imported when it is needed."""
+    """The library xarray, imported when it is needed."""
     try:
         import xarray
     except ImportError as error:
@@ -36,7 +36,7 @@ def xarray() -> Any:
 
 @contextlib.contextmanager
 def data_set(source: Any, attributes: Mapping[str, Any] | None = None) -> Iterator[Any]:
-    """An xarray Dataset as `opened` gives it, closed at the end where it is that of a file."""
+    """An xarray Dataset as `opened` returns it; the Dataset of a file is closed at the end."""
     ds = opened(source, attributes)
     try:
         yield ds
@@ -49,9 +49,9 @@ def data_set(source: Any, attributes: Mapping[str, Any] | None = None) -> Iterat
 
 
 def opened(source: Any, attributes: Mapping[str, Any] | None = None) -> Any:
-    """An xarray Dataset: the one that is given, or that of a NetCDF file, of which nothing but coordinates is read yet.
+    """An xarray Dataset: the given one, or that of a NetCDF file, of which only coordinates are read.
 
-    attributes: by "variable.attribute", or "attribute" of the file, those that it lacks or that are wrong.
+    attributes: Missing or wrong attributes, by "variable.attribute", or by "attribute" for an attribute of the file.
     """
     library = xarray()
     if isinstance(source, library.Dataset):
@@ -85,7 +85,7 @@ def opened(source: Any, attributes: Mapping[str, Any] | None = None) -> Any:
 
 
 def decoded(ds: Any, attributes: Mapping[str, Any] | None = None) -> Any:
-    """The data set with attributes, by the CF conventions, without the variables of which that makes no sense.
+    """The data set with attributes, decoded by the CF conventions, without variables that cannot be decoded.
 
     The reasons are in its `encoding["damaged"]`.
     """
@@ -118,7 +118,7 @@ def decoded(ds: Any, attributes: Mapping[str, Any] | None = None) -> Any:
 
 
 def _check_closed(file: BinaryIO, path: str) -> None:
-    """Refuse an HDF5 file that is not all there is."""
+    """Refuse an HDF5 file that is not self-contained."""
     try:
         import h5py
     except ImportError as error:
@@ -130,7 +130,7 @@ def _check_closed(file: BinaryIO, path: str) -> None:
 
 
 def _check_whole(path: str, size: int) -> None:
-    """Refuse a file in a classic form that promises more numbers than it has bytes: no such form packs them."""
+    """Refuse a file in a classic format that declares more numbers than it has bytes: these formats do not compress."""
     try:
         import netCDF4
     except ImportError as error:
@@ -142,7 +142,7 @@ def _check_whole(path: str, size: int) -> None:
 
 @contextlib.contextmanager
 def regular_file(source: Any, key: str) -> Iterator[tuple[str, BinaryIO]]:
-    """The path of a regular file, absolute, and the file itself, open to read: libraries are given what was looked at."""
+    """The absolute path of a regular file, and the open file, so that libraries read the same file that was checked."""
     path = os.path.abspath(path_of(key, source))
     with contextlib.ExitStack() as stack:
         try:

@@ -19,23 +19,23 @@ MUCH = 0.05
 
 @dataclass(frozen=True, eq=False)
 class FieldRequest:
-    """Request for data from a data set; numbers that are None follow from it.
+    """Request for data from a data set; numbers that are None follow from the data set.
 
     Args:
-        origin: Latitude and longitude [deg] of the origin of the inertial axes, (2,); needed.
-        start: Moment that is t = 0: a datetime, or a text as ISO 8601 writes it, in UTC where it names no zone; by default
-            the first of the data.
-        region: Least and largest north, east and depth that are read, (3, 2) [m]; by default all the data.
-        speed: Bound of the speed over ground [m/s] that says the region in place of `region`: what a vehicle that starts at
-            `around` can reach in `duration`.
-        duration: Time from the start on that is read [s]; by default to the end of the data.
-        variables: Names of the variables: eastward and northward, and upward if there is one; by default those with the
-            standard_name, or the name, that models give them.
-        spacing: Distances of the nodes that are made [m], (3,); by default at least as fine as the data's own.
-        fill: What stands where values are missing: "nearest", the default, "zero", or "refuse".
-        checksum: That of the numbers of the file that are read, so that another file is not taken for it.
-        attributes: Attributes that the file lacks or has wrong: a table of "variable.attribute", or "attribute" of the file
-            itself, and their values, for instance {"uo.units": "m s-1"}.
+        origin: Latitude and longitude [deg] of the origin of the inertial axes, (2,); required.
+        start: Date and time of t = 0: a datetime or a text in ISO 8601, in UTC unless it names a time zone; by default the
+            first time of the data.
+        region: Least and largest north, east and depth to read, (3, 2) [m]; by default all the data.
+        speed: Largest speed over ground [m/s], to compute the region instead of giving `region`: the region that a vehicle
+            starting at `around` can reach in `duration`.
+        duration: Length of the time from the start to read [s]; by default to the end of the data.
+        variables: Names of the eastward, northward and, if there is one, upward velocity; by default the variables with the
+            usual standard_name or the usual name in models.
+        spacing: Distances between the nodes of the regular grid [m], (3,); by default at least as fine as the data.
+        fill: Treatment of missing values: "nearest", the default, "zero", or "refuse".
+        checksum: Checksum of the numbers read, so that a changed file is refused.
+        attributes: Missing or wrong attributes of the file: a table of "variable.attribute", or "attribute" of the file
+            itself, with their values, for instance {"uo.units": "m s-1"}.
     """
 
     origin: Any = array(None, shape=(2,), unit="deg")
@@ -52,20 +52,20 @@ class FieldRequest:
 
 @dataclass(frozen=True, eq=False)
 class FieldData:
-    """Source of a field, and the changes of the data on the way.
+    """Source of a field, and the changes of the data by the regular grid.
 
     Attributes:
         file: Path of the file; None for a Dataset.
-        request: What was asked for, with all that followed from the data.
+        request: The request, completed with the numbers that follow from the data.
         nodes: Numbers of nodes (s, t, x, y, z).
-        missing: How many values were missing on land and below the sea floor, of those that were read.
-        values: How many were read.
-        error: Largest change of a velocity at the data's own nodes and times, by the regular grid [m/s].
+        missing: Number of values, among those read, that were missing on land and below the sea floor.
+        values: Number of values read.
+        error: Largest change of a velocity at the data's own nodes and times, due to the regular grid [m/s].
         last: The last time that was read [s].
-        more: Whether the data has later ones.
+        more: Whether the data has later times.
         speed: Root mean square of the velocities [m/s].
-        gap: Begin and end [s] of the longest time without a field, where it is more than twice the usual one; else None.
-        outages: How many fields had no value at all in the region, and were left out.
+        gap: Begin and end [s] of the longest time without a field, if it is more than twice the usual interval; else None.
+        outages: Number of fields left out because they had no value in the region.
     """
 
     file: str | None
@@ -82,7 +82,7 @@ class FieldData:
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """Sentences on values that were missing, and on what the regular grid changes."""
+        """Sentences on missing values and on the change due to the regular grid."""
         sentences = []
         if self.missing:
             part = 100.0 * self.missing / self.values
@@ -104,7 +104,7 @@ class FieldData:
         return tuple(sentences)
 
     def table(self) -> dict[str, Any]:
-        """Keys of a scene file that read the same numbers again."""
+        """Keys of a scene file with which the same numbers are read again."""
         request = {item.name: getattr(self.request, item.name) for item in dataclasses.fields(self.request)}
         plain = {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in request.items()}
         return {"file": self.file} | {name: value for name, value in plain.items() if value is not None}
@@ -112,7 +112,7 @@ class FieldData:
 
 @dataclass(frozen=True, eq=False)
 class FieldNumbers:
-    """Velocities (s, t, x, y, z, 3) [m/s] in inertial axes on a regular grid, and what its axes are."""
+    """Velocities (s, t, x, y, z, 3) [m/s] in inertial axes on a regular grid, and the grid's axes."""
 
     velocities: np.ndarray
     origin: np.ndarray
@@ -122,7 +122,7 @@ class FieldNumbers:
 
 
 def checked(faults: Faults, request: FieldRequest) -> dict[str, Any]:
-    """Values of a request that are read; the faults of others."""
+    """The valid values of a request; adds faults for the others."""
     values = read(request, faults)
     del values["fill"]
     if request.origin is None:
@@ -149,7 +149,7 @@ def checked(faults: Faults, request: FieldRequest) -> dict[str, Any]:
 
 
 def check_attributes(faults: Faults, attributes: Any) -> None:
-    """Note what is no table of attributes."""
+    """Add a fault for a value that is not a table of attributes."""
     if attributes is not None and not (
         isinstance(attributes, dict)
         and all(isinstance(k, str) and isinstance(v, str | int | float) for k, v in attributes.items())

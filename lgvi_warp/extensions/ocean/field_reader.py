@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A current read from a data set: its variables found, and taken field by field on to a regular grid."""
+"""Reader of a current from a data set: it finds the variables and interpolates each field to a regular grid."""
 
 from __future__ import annotations
 
@@ -33,10 +33,10 @@ LITTLE, MOST_FINE = 0.02, 2e7
 
 
 def read_field(source: Any, request: FieldRequest, *, outside: str, around: Any = (0.0, 0.0, 0.0)) -> FieldNumbers:
-    """Read the velocities of a data set, a path or an xarray Dataset, as they are asked for.
+    """Read the requested velocities from a path or an xarray Dataset.
 
-    outside: "hold" or "stop", what happens to members beyond the grid.
-    around: where members start [m], (3,), for a region that follows from a speed.
+    outside: Treatment of members beyond the grid, "hold" or "stop".
+    around: Start position of members [m], (3,), for a region that follows from a speed.
     """
     faults = Faults()
     values = checked(faults, request)
@@ -98,7 +98,7 @@ class _Component:
 
 
 def _components(ds: Any, request: FieldRequest, plane: LocalPlane) -> list[_Component]:
-    """The velocities of a data set on their grids."""
+    """The velocity components of a data set, each on its grid."""
     about, names = float(request.origin[1]), request.variables
 
     def component(along: str, quantity: cf.OceanQuantity, name: str) -> _Component:
@@ -134,7 +134,7 @@ def _components(ds: Any, request: FieldRequest, plane: LocalPlane) -> list[_Comp
 
 
 def _region(placed: Placed, request: FieldRequest, around: np.ndarray, outside: str) -> np.ndarray:
-    """Least and largest north, east and depth of the grid that is made, (3, 2)."""
+    """Least and largest north, east and depth of the regular grid, (3, 2) [m]."""
     known = _known_depths(placed)
     if request.region is not None:
         region = np.array(request.region)
@@ -155,7 +155,7 @@ def _region(placed: Placed, request: FieldRequest, around: np.ndarray, outside: 
 
 
 def _known_depths(placed: Placed) -> np.ndarray:
-    """From the first level to the deepest [m]."""
+    """Depths of the first and the deepest level [m]."""
     grid = placed.grid
     if grid.s_levels is not None:
         return np.array([0.0, float(np.nanmax(grid.s_levels.floor))])
@@ -171,7 +171,7 @@ def _overlap(placed: Placed, region: np.ndarray, remedy: str) -> np.ndarray:
 
 
 def _small(placed: Placed, key: str, region: np.ndarray, remedy: str) -> SceneError:
-    """The fault of data that do not reach where the mission may."""
+    """The error for data that do not cover the region that the mission may reach."""
     north, east = placed.north_east
     data = f"{_kilometers(north.min(), north.max())} north and {_kilometers(east.min(), east.max())} east"
     wanted = f"{_kilometers(*region[0])} north and {_kilometers(*region[1])} east"
@@ -183,7 +183,7 @@ def _kilometers(low: float, high: float) -> str:
 
 
 def _fine_spacing(placed: Placed, region: np.ndarray) -> np.ndarray:
-    """Distances of nodes as fine as the data's [m]."""
+    """Distances between nodes as fine as those of the data [m]."""
     along_y, along_x = placed.spacing()
     horizontal = min(d for d in (along_y, along_x, np.inf) if d > 0.0)
     grid = placed.grid
@@ -199,7 +199,7 @@ def _fine_spacing(placed: Placed, region: np.ndarray) -> np.ndarray:
 
 
 def _regular(region: np.ndarray, spacing: np.ndarray) -> Regular:
-    """The regular grid from one end of a region to the other, at least as fine."""
+    """The regular grid over a region, with at most the given spacing."""
     extent = region[:, 1] - region[:, 0]
     intervals = np.ceil(extent / spacing - 1e-6).astype(int)
     fine = np.where(intervals > 0, extent / np.maximum(intervals, 1), spacing)
@@ -208,7 +208,7 @@ def _regular(region: np.ndarray, spacing: np.ndarray) -> Regular:
 
 
 def _times(components: list[_Component], request: FieldRequest) -> tuple[range, np.ndarray, bool]:
-    """Numbers of the fields that are read, their times [s], and whether the data has later ones."""
+    """Indices of the fields to read, their times [s], and whether the data has later fields."""
     time = components[0].placed.grid.time
     for component in components[1:]:
         other = component.placed.grid.time
@@ -229,7 +229,7 @@ def _times(components: list[_Component], request: FieldRequest) -> tuple[range, 
 
 
 def _moment(components: list[_Component], request: FieldRequest) -> str | None:
-    """The moment of t = 0 as a text; None for the first of times that are not in the standard calendar."""
+    """The date and time of t = 0 as a text; None for the first time if it is not in the standard calendar."""
     time = components[0].placed.grid.time
     if time is None or (request.start is None and time.dtype.kind != "M"):
         return None
@@ -246,9 +246,9 @@ def _check_memory(scenarios: int, times: int, target: Regular) -> None:
 
 
 def _refined(components: list[_Component], target: Regular, fill: str, window: range, count: int) -> Regular:
-    """The grid with half the spacing in the plane, again and again, until it changes its first, middle and last field little.
+    """Halve the horizontal spacing until the grid changes the first, middle and last field little.
 
-    Of a turned grid no node is one of the new ones: what is lost at each falls in proportion to the spacing.
+    No node of a rotated grid is a node of the regular grid, so the change at each node falls in proportion to the spacing.
     """
     most = MOST_FINE / (components[0].placed.grid.scenarios * (count + 1.0))
     while True:
@@ -265,9 +265,9 @@ def _refined(components: list[_Component], target: Regular, fill: str, window: r
 
 
 class _FieldReader:
-    """Reads field by field.
+    """Reader of one field after another.
 
-    missing, count: values without a number, and all; checksum: of what is read; outage: mask of the times without any value.
+    missing, count: Numbers of missing and of all values. checksum: Of the numbers read. outage: Mask of times without values.
     """
 
     def __init__(self, components: list[_Component], target: Regular, fill: str):
@@ -285,7 +285,7 @@ class _FieldReader:
             self._note(grid.latitude, grid.longitude, np.zeros(0) if grid.depth is None else grid.depth)
 
     def read(self, window: range, seconds: np.ndarray) -> tuple[np.ndarray, np.ndarray | None, float]:
-        """Velocities (s, t, x, y, z, 3), their first time and the time between two of them [s], and the largest change."""
+        """Velocities (s, t, x, y, z, 3), their first time and time step [s], and the largest change."""
         self._note(seconds)
         scenarios = self.components[0].placed.grid.scenarios
         velocities = np.empty((scenarios, len(window), *self.target.counts, 3))
@@ -313,7 +313,7 @@ class _FieldReader:
         return velocities, times, error + change
 
     def field(self, scenario: int, time: int) -> tuple[np.ndarray, float] | None:
-        """Velocities (x, y, z, 3) of one field, and the largest change; None where a component has no value at all."""
+        """Velocities (x, y, z, 3) of one field, and the largest change; None if a component has no value at all."""
         total = np.zeros((*self.target.counts, 3))
         changes: dict[int, list[Any]] = {}
         for group, component, onto, along in zip(self.group, self.components, self.onto, self.along, strict=True):
@@ -351,7 +351,7 @@ class _FieldReader:
 
 
 def _same_nodes(single: _Component, compared: _Component) -> bool:
-    """Whether two components stand at the same nodes."""
+    """Whether two components have the same nodes."""
     first, second = single.placed.grid, compared.placed.grid
     pairs = ((first.latitude, second.latitude), (first.longitude, second.longitude), (first.depth, second.depth))
     none = np.zeros(0)
@@ -360,12 +360,12 @@ def _same_nodes(single: _Component, compared: _Component) -> bool:
 
 
 def _largest(change: list[Any]) -> float:
-    """Largest length of vectors of three parts, each an array (n,) or 0."""
+    """Largest length of vectors of three components, each an array (n,) or 0."""
     return float(np.sqrt(np.max(sum(np.square(part) for part in change), initial=0.0)))
 
 
 def _gap(seconds: np.ndarray) -> tuple[float, float] | None:
-    """Begin and end [s] of the longest time without a field, where it is more than twice the usual one."""
+    """Begin and end [s] of the longest time without a field, if it is more than twice the usual interval."""
     steps = np.diff(seconds)
     if not len(steps) or steps.max() <= MOST_OF_TIME * np.median(steps) * (1.0 + EQUAL_TIMES):
         return None
@@ -374,9 +374,9 @@ def _gap(seconds: np.ndarray) -> tuple[float, float] | None:
 
 
 def _steps_of_time(seconds: np.ndarray) -> int:
-    """Number of equal steps that replace the times: so many that each time of the data is one of them, where there are such.
+    """Number of equal time steps that replace the data's times, if possible so that each time of the data is among them.
 
-    Else as many as the least interval asks for, up to four times as many as the data have; a gap would smear them then.
+    Otherwise the steps are about as long as the shortest interval, but at most four for each interval of the data on average.
     """
     steps = np.diff(seconds)
     if not len(steps):
@@ -394,7 +394,7 @@ def _steps_of_time(seconds: np.ndarray) -> int:
 
 
 def _in_equal_steps(seconds: np.ndarray, velocities: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray, float]:
-    """First time and step [s], velocities at these times, and by how much they change those at times of the data."""
+    """First time and step [s], velocities at equal steps, and the largest change of velocities at times of the data."""
     step = (seconds[-1] - seconds[0]) / count
     if count == len(seconds) - 1 and np.ptp(np.diff(seconds)) <= EQUAL_TIMES * step:
         return np.array([seconds[0], step]), velocities, 0.0
@@ -404,7 +404,7 @@ def _in_equal_steps(seconds: np.ndarray, velocities: np.ndarray, count: int) -> 
 
 
 def _at_times(velocities: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """Velocities at numbers of times with parts."""
+    """Velocities at fractional indices of times."""
     low = np.clip(np.floor(at).astype(int), 0, velocities.shape[1] - 2)
     part = (at - low)[None, :, None, None, None, None]
     return np.asarray((1.0 - part) * velocities[:, low] + part * velocities[:, low + 1])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The depth of the sea floor read from a file, NetCDF or GeoTIFF, on to a regular grid in metres."""
+"""Reader of the depth of the sea floor from NetCDF or GeoTIFF, interpolated to a regular grid in metres."""
 
 from __future__ import annotations
 
@@ -28,26 +28,26 @@ MOST_NODES = 4_000_000
 
 
 class DepthSource(Protocol):
-    """Depths of a data set in the plane of a scene. positive: whether its numbers grow "up" or "down"."""
+    """Depths of a data set in the plane of a scene. positive: "up" if its numbers are elevations, "down" if depths."""
 
     positive: str
 
     def contains(self, north: np.ndarray, east: np.ndarray) -> np.ndarray:
-        """Mask of places [m] with data around them."""
+        """Mask of points [m] with data around them."""
 
     def bounds(self) -> np.ndarray:
         """Least and largest north and east of the data, (2, 2) [m]."""
 
     def spacing(self) -> np.ndarray:
-        """Distances of its nodes along north and east, (2,) [m]."""
+        """Distances between its nodes along north and east, (2,) [m]."""
 
     def depths(self, target: Regular) -> np.ndarray:
-        """Depths (x, y) [m] at the nodes of a regular grid, NaN where a value is missing."""
+        """Depths (x, y) [m] at the nodes of a regular grid; missing values are NaN."""
 
 
 @dataclass(frozen=True, eq=False)
 class FloorNumbers:
-    """Depths (x, y) [m] on a regular grid, place of its first node and spacing (2,) [m]."""
+    """Depths (x, y) [m] on a regular grid, position of its first node and spacing (2,) [m]."""
 
     depth: np.ndarray
     origin: np.ndarray
@@ -55,7 +55,7 @@ class FloorNumbers:
 
 
 def read_floor(file: Any, request: FloorRequest) -> FloorNumbers:
-    """Read the floor from a path, or from an xarray Dataset, as it is asked for."""
+    """Read the requested floor from a path or from an xarray Dataset."""
     faults = Faults()
     values = read(request, faults)
     region, spacing = values["region"], values["spacing"]
@@ -133,7 +133,7 @@ class _Gridded:
 
 
 def _variable(ds: Any, named: str | None) -> tuple[cf.OceanQuantity, str]:
-    """The variable that is the floor, and what it is."""
+    """Quantity and name of the variable that holds the floor."""
     both = (cf.FLOOR_DEPTH, cf.ELEVATION)
     if named is not None:
         name = str(cf.variable_name(ds, cf.FLOOR_DEPTH, named))
@@ -155,7 +155,7 @@ def _cut(grid: cf.Gridded, plane: LocalPlane, region: np.ndarray | None) -> cf.G
 
 
 def _target(source: DepthSource, region: np.ndarray | None, spacing: np.ndarray) -> Regular:
-    """The regular grid over a region, or over all of the data, at least as fine as the spacing."""
+    """The regular grid over a region, or over all data, with at most the given spacing."""
     if region is None:
         region = _within(source)
     elif not source.contains(*edge_of(region)).all():
@@ -171,7 +171,7 @@ def _target(source: DepthSource, region: np.ndarray | None, spacing: np.ndarray)
 
 
 def _within(source: DepthSource) -> np.ndarray:
-    """A box in the plane that is within the data, (2, 2) [m]: from and to, north and east."""
+    """A box within the data, (2, 2) [m]: least and largest north, least and largest east."""
     box = source.bounds()
     middle = box.mean(axis=1, keepdims=True)
     whole, none = 1.0, 0.0
@@ -185,7 +185,7 @@ def _within(source: DepthSource) -> np.ndarray:
 
 
 def _small(source: DepthSource, region: np.ndarray) -> SceneError:
-    """The fault of data that do not reach where they are asked for."""
+    """The error for data that do not cover the requested region."""
 
     def words(box: np.ndarray) -> str:
         north, east = (f"{low / 1e3:.4g} to {high / 1e3:.4g} km" for low, high in box)

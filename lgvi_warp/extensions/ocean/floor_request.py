@@ -14,18 +14,18 @@ POSITIVE = ("", "up", "down")
 
 @dataclass(frozen=True, eq=False)
 class FloorRequest:
-    """Request for depths from a file; numbers that are None follow from it.
+    """Request for depths from a file; numbers that are None follow from the file.
 
     Args:
         origin: Latitude and longitude [deg] of the origin of the inertial axes, (2,).
-        region: Least and largest north and east that are read, (2, 2) [m]; by default all that is in the file.
-        spacing: Distances of the nodes that are made [m], (2,); by default as fine as the file's own.
-        variable: Name of the variable of NetCDF; by default the one that is a depth of the floor or an elevation by its
-            standard_name, or by the name that data sets give it.
-        positive: "up" where numbers are elevations, "down" where they are depths; by default "" what the variable says, and
-            "up" of a raster.
-        fill: What stands where values are missing: "refuse", the default, nothing; "nearest"; or "zero", land at the surface.
-        attributes: Attributes that a NetCDF file lacks or has wrong: a table of "variable.attribute" and their values, for
+        region: Least and largest north and east to read, (2, 2) [m]; by default the whole file.
+        spacing: Distances between the nodes of the regular grid [m], (2,); by default as fine as the file.
+        variable: Name of the NetCDF variable; by default the variable that is a floor depth or an elevation by its
+            standard_name or by a usual name.
+        positive: "up" if the numbers are elevations, "down" if they are depths. With "", the default, the variable states
+            the direction, and a raster is "up".
+        fill: Treatment of missing values: "refuse", the default; "nearest"; or "zero", for land at the surface.
+        attributes: Missing or wrong attributes of a NetCDF file: a table of "variable.attribute" with their values, for
             instance {"z.grid_mapping": "EPSG:3996"}.
     """
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Values that a data set does not have, on land and below the sea floor: counted, and filled."""
+"""Filling of missing values of a data set, on land and below the sea floor."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ FILLS = ("nearest", "zero", "refuse")
 
 
 def filled(field: np.ndarray, spacing: tuple[float, float], fill: str) -> np.ndarray:
-    """The field (k, y, x) without holes; all NaN where no value is there to fill them with.
+    """The field (k, y, x) with missing values filled; all NaN if the field has no value.
 
     Args:
-        field: NaN where a value is missing.
-        spacing: Of the nodes along y and x [m].
-        fill: "nearest", the nearest level in the same column, and where it has none, the nearest column that has; or "zero".
+        field: Values, NaN where missing.
+        spacing: Distances between nodes along y and x [m].
+        fill: "nearest", the nearest level with a value in the same column, or else the nearest column with values; or "zero".
     """
     holes = np.isnan(field)
     if not holes.any() or holes.all():
@@ -32,7 +32,7 @@ def filled(field: np.ndarray, spacing: tuple[float, float], fill: str) -> np.nda
 
 
 def _nearest_level(holes: np.ndarray) -> np.ndarray:
-    """Nearest level above each place that has a value; above the first, the first (k, y, x)."""
+    """Nearest level with a value at or above each node (k, y, x); above the first such level, that level."""
     level = np.arange(len(holes))[:, None, None]
     above = np.maximum.accumulate(np.where(holes, -1, level), axis=0)
     first = np.argmin(holes, axis=0)[None]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reference systems that files tell, as text or as numbers: to places on the Earth, without any other file."""
+"""Coordinate reference systems of files, given as text or numbers: conversion to latitude and longitude."""
 
 from __future__ import annotations
 
@@ -33,14 +33,14 @@ STEP = 10.0
 
 @dataclass(frozen=True, eq=False)
 class Projection:
-    """Plane of x and y in a reference system. unit: of its axes [m, or deg]; geographic: whether those are degrees."""
+    """Plane of x and y in a reference system. unit: Unit of its axes [m, or deg]. geographic: Whether this is degrees."""
 
     transformer: Any
     geographic: bool
     unit: float = 1.0
 
     def geodetic(self, x: Any, y: Any) -> tuple[np.ndarray, np.ndarray]:
-        """Latitudes and longitudes [deg] of x and y [m, or deg]; NaN for what is no place."""
+        """Latitudes and longitudes [deg] of x and y [m, or deg]; NaN for points outside the projection."""
         longitude, latitude = self.transformer.transform(
             np.asarray(x, float) / self.unit, np.asarray(y, float) / self.unit, direction="INVERSE"
         )
@@ -53,7 +53,7 @@ class Projection:
         return np.asarray(x) * self.unit, np.asarray(y) * self.unit
 
     def neighbors(self, latitude: Any, longitude: Any, along: str) -> tuple[Any, Any]:
-        """Places [deg] a little behind and before others along "x" or "y": latitudes and longitudes of both."""
+        """Points [deg] slightly behind and ahead of others along "x" or "y": latitudes and longitudes of both."""
         x, y = self.plane(latitude, longitude)
         step = STEP / 111e3 if self.geographic else STEP
         dx, dy = (step, 0.0) if along == "x" else (0.0, step)
@@ -61,9 +61,9 @@ class Projection:
 
 
 def transformer_of(system: Any) -> tuple[Any, bool, float]:
-    """From longitude and latitude [deg] to a system, a pyproj CRS; whether its axes are degrees, and their unit [m, or deg].
+    """Transformer from longitude and latitude [deg] to a pyproj CRS, whether its axes are degrees, and their unit.
 
-    Raises ValueError with words that say why there is none.
+    Raises ValueError with the reason if there is no transformer.
     """
     from pyproj import CRS, Transformer
 
@@ -81,7 +81,7 @@ def transformer_of(system: Any) -> tuple[Any, bool, float]:
 
 
 def projection(where: str, attributes: Mapping[str, Any]) -> Projection:
-    """Plane that a grid mapping of the CF conventions tells, by a text or by its numbers (CF 1.11, appendix F)."""
+    """Plane of a grid mapping of the CF conventions, given by a text or by its parameters (CF 1.11, appendix F)."""
     try:
         from pyproj.exceptions import ProjError
     except ImportError as error:
@@ -97,7 +97,7 @@ def projection(where: str, attributes: Mapping[str, Any]) -> Projection:
 
 
 def _system(attributes: Mapping[str, Any]) -> Any:
-    """The system of a grid mapping, of pyproj."""
+    """The pyproj CRS of a grid mapping."""
     from pyproj import CRS
 
     texts = [str(np.asarray(attributes[name]).flat[0]) for name in TEXTS if name in attributes]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Rasters of elevations, GeoTIFF in any projection: bilinear between the middles of their pixels."""
+"""Rasters of elevations, GeoTIFF in any projection, with bilinear interpolation between pixel centres."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def is_raster(file: BinaryIO) -> bool:
 
 
 class Raster:
-    """The first band of a GeoTIFF, open, in the plane of a scene; only the part that is asked for is read."""
+    """The first band of an open GeoTIFF in the plane of a scene; only the requested part is read."""
 
     def __init__(self, path: str, plane: LocalPlane, positive: str, file: Any):
         self.path, self.plane, self.positive, self.file = path, plane, positive, file
@@ -58,7 +58,7 @@ class Raster:
             )
 
     def pixels(self, north: np.ndarray, east: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Numbers of the row and of the column of places [m], with parts, from the middle of the first pixel on."""
+        """Fractional row and column indices of points [m], counted from the centre of the first pixel."""
         latitude, longitude = self.plane.geodetic(north, east)
         x, y = self.transformer.transform(longitude, latitude)
         if self.geographic:
@@ -70,7 +70,7 @@ class Raster:
         return np.asarray(row - 0.5), np.asarray(column - 0.5)
 
     def contains(self, north: np.ndarray, east: np.ndarray) -> np.ndarray:
-        """Mask of places [m] with four pixels around them."""
+        """Mask of points [m] with four pixels around them."""
         inside = np.ones(np.shape(north), bool)
         for at, count in zip(self.pixels(north, east), self.shape, strict=True):
             inside &= (at >= -ROUND_OFF) & (at <= count - 1 + ROUND_OFF)
@@ -85,7 +85,7 @@ class Raster:
         return np.array([[north.min(), north.max()], [east.min(), east.max()]])
 
     def spacing(self) -> np.ndarray:
-        """Distances of pixels in the middle along north and east (2,) [m]; of a raster that is turned the lesser for both."""
+        """Pixel distances along north and east at the centre (2,) [m]; for a rotated raster, the lesser for both."""
         row, column = 0.5 * (self.shape[0] - 1), 0.5 * (self.shape[1] - 1)
         north, east = self._places(np.array([row, row + 1.0, row]), np.array([column, column, column + 1.0]))
         steps = np.abs([north[1:] - north[0], east[1:] - east[0]])
@@ -94,7 +94,7 @@ class Raster:
         return lengths if aligned else np.full(2, lengths.min())
 
     def depths(self, target: Regular) -> np.ndarray:
-        """Depths (x, y) [m] at the nodes of a regular grid, NaN where one of the pixels around has no value."""
+        """Depths (x, y) [m] at the nodes of a regular grid; NaN if one of the four pixels around has no value."""
         row, column = self.pixels(*np.meshgrid(target.nodes(0), target.nodes(1), indexing="ij"))
         row, column = (np.clip(at, 0.0, n - 1.0) for at, n in zip((row, column), self.shape, strict=True))
         i, j = (np.minimum(at.astype(int), n - 2) for at, n in zip((row, column), self.shape, strict=True))
@@ -120,7 +120,7 @@ class Raster:
         return np.asarray(np.ma.filled(read.astype(np.float64), np.nan)) * scale + offset
 
     def _places(self, row: np.ndarray, column: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """North and east [m] of numbers of rows and columns with parts."""
+        """North and east [m] of fractional row and column indices."""
         x, y = _applied(self.affine, column + 0.5, row + 0.5)
         longitude, latitude = self.transformer.transform(x, y, direction="INVERSE")
         north, east = self.plane.local(latitude, longitude)
@@ -128,7 +128,7 @@ class Raster:
         return np.where(known, north, np.nan), np.where(known, east, np.nan)
 
     def _transformer(self, crs: Any) -> tuple[Any, bool]:
-        """From longitude and latitude [deg] to the raster's x and y, and whether those are degrees too."""
+        """Transformer from longitude and latitude [deg] to the raster's x and y, and whether these are degrees, too."""
         from pyproj import CRS
         from pyproj.exceptions import ProjError
 
@@ -147,13 +147,13 @@ class Raster:
 
 
 def _applied(affine: Any, column: Any, row: Any) -> tuple[Any, Any]:
-    """x and y of columns and rows, or the other way round for the inverse."""
+    """x and y of columns and rows; with the inverse affine map, columns and rows of x and y."""
     return affine.a * column + affine.b * row + affine.c, affine.d * column + affine.e * row + affine.f
 
 
 @contextlib.contextmanager
 def open_raster(path: str, file: BinaryIO, plane: LocalPlane, positive: str) -> Iterator[Raster]:
-    """Open the raster of an open file, which stays so."""
+    """Open the raster of an open file; the file stays open."""
     try:
         import rasterio
     except ImportError as error:
@@ -167,7 +167,7 @@ def open_raster(path: str, file: BinaryIO, plane: LocalPlane, positive: str) -> 
 
 @contextlib.contextmanager
 def _damage(path: str) -> Iterator[None]:
-    """Turn what the library makes of a damaged file into a fault."""
+    """Convert the library's errors for a damaged file into a SceneError."""
     from rasterio.errors import RasterioError
 
     try:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""From the grid of a data set to a regular one in metres: linear between the nodes of each."""
+"""Linear interpolation from the grid of a data set to a regular grid in metres, and back."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Regular:
     counts: tuple[int, int, int]
 
     def nodes(self, axis: int) -> np.ndarray:
-        """Places of the nodes along an axis."""
+        """Positions of the nodes along an axis."""
         return np.asarray(self.origin[axis] + self.spacing[axis] * np.arange(self.counts[axis]))
 
 
@@ -46,12 +46,12 @@ class Placed:
 
     @functools.cached_property
     def placed_nodes(self) -> np.ndarray:
-        """Mask of the nodes (y, x) that have a place."""
+        """Mask of the nodes (y, x) that have a position."""
         return np.isfinite(self.grid.places()[0])
 
     @functools.cached_property
     def north_east(self) -> tuple[np.ndarray, np.ndarray]:
-        """The nodes in the plane (y, x) [m]; those without a place where the others go on to."""
+        """North and east of the nodes (y, x) [m]; nodes without a position are extrapolated from the others."""
         north, east = self.plane.local(*self.grid.places())
         return (
             (north, east)
@@ -61,11 +61,11 @@ class Placed:
 
     @functools.cached_property
     def curved(self) -> CurvedGrid:
-        """The same as a grid of cells with four corners."""
+        """This grid as a grid of cells with four corners."""
         return CurvedGrid(*self.north_east, self.placed_nodes)
 
     def fractions(self, north: np.ndarray, east: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Numbers of the row and of the column of places, with parts; beyond the grid too."""
+        """Fractional row and column indices of points, also beyond the grid."""
         if not self.grid.rectilinear:
             return self.curved.fractions(north, east)
         latitude, longitude = self.plane.geodetic(north, east)
@@ -77,7 +77,7 @@ class Placed:
         return _numbered(latitude, self.grid.latitude), _numbered(longitude, self.grid.longitude)
 
     def contains(self, north: np.ndarray, east: np.ndarray) -> np.ndarray:
-        """Mask of places within the outermost nodes; along an axis of one node all are."""
+        """Mask of points within the outermost nodes; an axis of one node contains all points."""
         inside = np.ones(np.shape(north), bool)
         for at, count in zip(self.fractions(north, east), self.grid.shape[3:], strict=True):
             if count > 1:
@@ -85,7 +85,7 @@ class Placed:
         return inside
 
     def inner_box(self) -> np.ndarray:
-        """A box in the plane that is within the data, (2, 2) [m]: from and to, north and east."""
+        """A box within the data, (2, 2) [m]: least and largest north, least and largest east."""
         north, east = self.north_east
         box = np.array([[north.min(), north.max()], [east.min(), east.max()]])
         middle = np.array([[x.mean()] for x in (north, east)])
@@ -102,7 +102,7 @@ class Placed:
         return box
 
     def spacing(self) -> tuple[float, float]:
-        """Least distance of neighbours along y and along x [m]; 0 along an axis of one node."""
+        """Least distance between neighbours along y and along x [m]; 0 along an axis of one node."""
         north, east = (np.where(self.placed_nodes, x, np.nan) for x in self.north_east)
         steps = (np.hypot(np.diff(north, axis=axis), np.diff(east, axis=axis)) for axis in (0, 1))
         # Nodes that a writer repeats, at a fold or a seam, are no neighbors.
@@ -111,7 +111,7 @@ class Placed:
 
 
 class Onto:
-    """A variable of a data set taken on to a regular grid, and back to its own nodes to see what that changed."""
+    """Interpolation of a variable to a regular grid, and back to its own nodes to measure the change."""
 
     def __init__(self, placed: Placed, target: Regular):
         self.placed, self.target = placed, target
@@ -123,13 +123,13 @@ class Onto:
     def __call__(self, field: np.ndarray, depths: np.ndarray | None = None) -> np.ndarray:
         """A field (k, y, x) at the nodes of the regular grid (x, y, z): north, east, depth.
 
-        depths: of the field's nodes (k, y, x), rising, where levels follow the sea floor.
+        depths: Rising depths of the field's nodes (k, y, x), if levels follow the sea floor.
         """
         level = _along_first(field, self.levels) if depths is None else at_depths(field, depths, self.target.nodes(2))
         return np.moveaxis(_in_plane(level, self.rows, self.columns), 0, -1)
 
     def change(self, field: np.ndarray, regular: np.ndarray, depths: np.ndarray | None = None) -> np.ndarray:
-        """Differences (n,) at the data's own nodes within the regular grid, between the data and what became of it."""
+        """Differences (n,) between the data and the regular grid, at the data's own nodes within the regular grid."""
         from scipy.ndimage import map_coordinates
 
         if depths is None:
@@ -179,12 +179,12 @@ def directions(placed: Placed, along: str) -> np.ndarray:
 
 
 def _water(placed: Placed) -> np.ndarray:
-    """Mask of the nodes that have a place and are not on land."""
+    """Mask of the nodes that have a position and are not on land."""
     return placed.placed_nodes if placed.grid.land is None else placed.placed_nodes & ~placed.grid.land
 
 
 def _extended(values: np.ndarray, usable: np.ndarray) -> np.ndarray:
-    """Numbers (y, x), those that are not known by a cubic in row and column through the others, and the nearest one's rest."""
+    """Numbers (y, x); unusable ones come from a cubic fit in row and column, plus the nearest node's residual."""
     from scipy.ndimage import distance_transform_edt
 
     y, x = (np.linspace(-1.0, 1.0, n) for n in values.shape)
@@ -195,7 +195,7 @@ def _extended(values: np.ndarray, usable: np.ndarray) -> np.ndarray:
 
 
 def edge_of(box: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Places along the edge of a box (2, 2) in the plane [m]."""
+    """Points along the edge of a box (2, 2) in the plane [m]."""
     north, east = (np.linspace(float(low), float(high), ON_EDGE) for low, high in box[:2])
     sides = np.meshgrid(north, east, indexing="ij")
     rim = np.ones((ON_EDGE, ON_EDGE), bool)
@@ -204,7 +204,7 @@ def edge_of(box: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _numbered(places: np.ndarray, nodes: np.ndarray) -> np.ndarray:
-    """Number of the node with parts of an interval; beyond the ends as the last interval goes on. One node is number 0."""
+    """Fractional node indices of points, extrapolated beyond the ends; 0 for an axis of one node."""
     if len(nodes) == 1:
         return np.zeros(np.shape(places))
     cell = np.clip(np.searchsorted(nodes, places, side="right") - 1, 0, len(nodes) - 2)
@@ -216,7 +216,7 @@ def _held(places: np.ndarray, nodes: np.ndarray) -> np.ndarray:
 
 
 def _along_first(field: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """Values at numbers with parts (m,) along the first axis, held beyond its ends."""
+    """Values at fractional indices (m,) along the first axis, constant beyond its ends."""
     held = np.clip(at, 0.0, len(field) - 1.0)
     low = np.clip(np.floor(held).astype(int), 0, max(len(field) - 2, 0))
     part = (held - low).reshape(-1, *(1,) * (field.ndim - 1))
@@ -225,7 +225,7 @@ def _along_first(field: np.ndarray, at: np.ndarray) -> np.ndarray:
 
 
 def _in_plane(field: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
-    """Values (k, ...) of a field (k, y, x) at rows and columns with parts (...), bilinear, held beyond the edges."""
+    """Values (k, ...) of a field (k, y, x) at fractional rows and columns (...), bilinear, constant beyond the edges."""
     sizes = field.shape[1:]
     (j, y), (i, x) = (_cell(at, size) for at, size in zip((rows, columns), sizes, strict=True))
     j1, i1 = np.minimum(j + 1, sizes[0] - 1), np.minimum(i + 1, sizes[1] - 1)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Levels that follow the sea floor, as ROMS, CROCO and Delft3D have them: depths by the CF conventions, appendix D."""
+"""Levels that follow the sea floor, as in ROMS, CROCO and Delft3D: depths by the CF conventions, appendix D."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ KINDS = {"ocean_s_coordinate": 0, "ocean_s_coordinate_g1": 1, "ocean_s_coordinat
 class SLevels:
     """Depths of levels that follow the floor.
 
-    kind: 0, 1 or 2, of the formula. s, C: (k,), -1 at the floor, 0 at the surface. critical: depth_c [m]. floor: (y, x) [m].
-    surface: elevation of the surface times `scale` [m], (y, x) or (t, y, x) lazily, with `shift` more rows and columns than
-    the floor, between which it is a mean; None for 0. time: name of its dimension of time.
+    kind: Number of the formula, 0, 1 or 2. s, C: (k,), -1 at the floor, 0 at the surface. critical: depth_c [m].
+    floor: Depth (y, x) [m]. surface: Elevation, times `scale` [m], (y, x) or lazily (t, y, x); None for 0. It has `shift`
+    more rows and columns than the floor, and neighbours are averaged. time: Name of its time dimension.
     """
 
     kind: int
@@ -38,7 +38,7 @@ class SLevels:
     time: Any
 
     def depths(self, time: int) -> np.ndarray:
-        """Depths of the nodes (k, y, x) [m] at a time, from the mean surface, in the order of s."""
+        """Depths of the nodes (k, y, x) [m] below the mean surface at a time, in the order of s."""
         floor, surface = self.floor[None], self._surface(time)
         s, C = self.s[:, None, None], self.C[:, None, None]
         if self.kind == 2:
@@ -48,7 +48,7 @@ class SLevels:
         return -(stretched + surface * (1.0 + (stretched / floor if self.kind else s)))
 
     def part(self, rows: slice, columns: slice) -> SLevels:
-        """The same of some rows and columns."""
+        """The levels of some rows and columns."""
         surface = self.surface
         if surface is not None:
             index = {dim: slice(part.start, part.stop + more) for dim, part, more in
@@ -81,7 +81,7 @@ def s_levels(ds: Any, name: str, level: str, horizontal: tuple[Any, Any], shape:
             return None
 
     def on_nodes(term: str, *names: str) -> tuple[Any, tuple[int, int], float] | None:
-        """A field, by how many rows and columns it has more than the nodes, and the size of its unit [m]."""
+        """A field, the numbers of rows and columns that it has more than the nodes, and its unit in metres."""
         word = next((word for word in (terms.get(term), *names) if word in ds.variables), None)
         if word is None:
             return None
@@ -125,7 +125,7 @@ def s_levels(ds: Any, name: str, level: str, horizontal: tuple[Any, Any], shape:
 
 
 def at_depths(field: np.ndarray, depths: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    """Values (m, y, x) at depths (m,) of a field (k, y, x) at depths (k, y, x) that rise: linear, held beyond the ends."""
+    """Values (m, y, x) at depths (m,) of a field (k, y, x) at rising depths (k, y, x): linear, constant beyond the ends."""
     result = np.empty((len(wanted), *field.shape[1:]))
     most = max(len(field) - 2, 0)
     for number, depth in enumerate(wanted):

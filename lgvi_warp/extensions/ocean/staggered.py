@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Staggered grids of ROMS and CROCO: u between two rho points along xi, v along eta, and what the rho points know at both."""
+"""Staggered grids of ROMS and CROCO: u lies between two rho points along xi, and v along eta."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ MASKS = ("mask_rho", "mask_u", "mask_v")
 
 
 def trimmed(ds: Any) -> Any:
-    """The data set without points beyond its last rho point: a file cut by equal ranges of indices has them."""
+    """The data set without points beyond its last rho point; a file cut by equal index ranges has such points."""
     cut = {dim: slice(0, -1) for dim, rho in BETWEEN.items() if 1 < ds.sizes.get(dim, 0) == ds.sizes.get(rho)}
     ds = ds.isel(cut)
     for name in MASKS[1:] if cut else ():
@@ -39,7 +39,7 @@ def averaged(values: np.ndarray, shift: tuple[int, int]) -> np.ndarray:
 
 
 def shift_of(field: Any, dims: tuple[Any, Any], shape: Any) -> tuple[int, int] | None:
-    """By how many points a field has more than a grid along y and x, 0 or 1; None where it has no part in that grid."""
+    """Numbers of points, 0 or 1, that a field has more than a grid along y and x; None if it does not fit the grid."""
     shift = []
     for own, dim, size in zip(field.dims[-2:], dims, shape[-2:], strict=False):
         family = own == dim or any(str(own).startswith(p) and str(dim).startswith(p) for p in PREFIXES)
@@ -48,14 +48,14 @@ def shift_of(field: Any, dims: tuple[Any, Any], shape: Any) -> tuple[int, int] |
 
 
 def at_nodes(ds: Any, name: str, dims: tuple[Any, Any], shape: Any) -> np.ndarray | None:
-    """A field of the rho points at the nodes of a grid (y, x), as the mean of its neighbors; None where there is none."""
+    """A field of the rho points at the nodes of a grid (y, x), as the mean of neighbors; None without such a field."""
     if name not in ds.variables or (shift := shift_of(ds[name], dims, shape)) is None or ds[name].ndim != 2:
         return None
     return averaged(np.asarray(ds[name].values, dtype=np.float64), shift)
 
 
 def places_at(ds: Any, variable: Any) -> tuple[tuple[Any, Any], np.ndarray, np.ndarray] | None:
-    """Dimensions, latitudes and longitudes (y, x) of a variable between the rho points; None where the file has no such."""
+    """Dimensions, latitudes and longitudes (y, x) of a variable between rho points; None if the file has no rho points."""
     dims = [[dim for dim in variable.dims if str(dim).startswith(prefix)] for prefix in PREFIXES]
     if [len(found) for found in dims] != [1, 1]:
         return None
@@ -70,7 +70,7 @@ def places_at(ds: Any, variable: Any) -> tuple[tuple[Any, Any], np.ndarray, np.n
 
 
 def land_at(ds: Any, dims: tuple[Any, Any], shape: Any) -> np.ndarray | None:
-    """Nodes (y, x) that a mask of ROMS calls land: one at these nodes, else a rho point beside them; None without a mask."""
+    """Land nodes (y, x) by a ROMS mask at these nodes, or else at the rho points next to them; None without a mask."""
     for name in MASKS:
         if name in ds.variables and tuple(ds[name].dims) == tuple(dims):
             return np.asarray(ds[name].values) < 0.5

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Units of data sets: how much of the SI unit each of them is."""
+"""Units of data sets, with their factors to SI units."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ POSITIVE = re.compile(r"[,;(\s]*positive\s*[:=]?\s*(up|down)(?:ward)?s?\)?\s*$",
 
 
 def factor(where: str, text: Any, unit: str) -> float:
-    """Size of a variable's unit in "m/s", "m" or "s"."""
+    """Factor from a variable's unit to "m/s", "m" or "s"."""
     known = UNITS[unit]
     if text is None or not str(text).strip():
         remedy = f"write the attribute units, {unit!r} for instance, or give attributes = {{'{where}.units': {unit!r}}}"
@@ -37,13 +37,13 @@ def factor(where: str, text: Any, unit: str) -> float:
 
 
 def positive(attributes: Any) -> str:
-    """Direction in which numbers grow, "up" or "down", by the attribute `positive`, or behind the unit; "" where none is."""
+    """Direction in which numbers grow, "up" or "down", from the attribute `positive` or after the unit; "" if absent."""
     behind = POSITIVE.search(str(attributes.get("units", "")))
     return str(attributes.get("positive", behind[1] if behind else "")).strip().lower()
 
 
 def _plain(text: str) -> str:
-    """A unit as the table has it: "meters second-1", "m s**-1" and "m.s^-1" are "m/s"."""
+    """A unit as written in the table: "meters second-1", "m s**-1" and "m.s^-1" become "m/s"."""
     plain = POSITIVE.sub("", text).strip().lower().replace("**", "").replace("_", " ").replace(" per ", "/")
     plain = re.sub(r"[\^{}]", "", plain)
     for word, letter in WORDS:

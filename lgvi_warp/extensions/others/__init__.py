@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Assimilation, exports to maps and ROS, and the predictive control law."""
+"""Data assimilation, exports to maps and ROS, FMU export, and model predictive control."""
 
 # Where the device code of the law is.
 DEVICE = f"{__name__}.device"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The sea as it is forecast, and its floor: sea states, tides, and contact with the floor."""
+"""Sea states of forecasts, tides, and contact with the sea floor."""
 
 # Where the device code of the terms is.
 DEVICE = f"{__name__}.device"

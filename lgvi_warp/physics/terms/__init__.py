@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The terms that a scene may name, one file each: weight, drag, currents, tethers, thrusters, fins, waves and noise."""
+"""The terms of the core, one file each: weight, drag, currents, tethers, thrusters, fins, waves and noise."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ IMPLIED: tuple[Term, ...] = (Weight(), Restoring())
 
 
 def register(kind: type[AnyTerm]) -> type[AnyTerm]:
-    """Register a user's term, event or part of a controller under its `type`, for scene files; a decorator of the class.
+    """Register a user's term, event or part of a controller under its `type`, for scene files; use as a class decorator.
 
-    A class registers itself when it is defined, unless its `type` is taken; this function raises an error in that case.
+    A class already registers itself when it is defined, unless its `type` is taken. This function raises an error then.
 
     Args:
-        kind: Subclass of `Term`, of `Event` or of a part, such as `ControlLaw`, with a `type` of its own.
+        kind: Subclass of `Term`, of `Event` or of a part, such as `ControlLaw`, with a new `type`.
 
     Returns:
         The same class.
@@ -77,7 +77,7 @@ def from_list(entries: Any) -> tuple[Term, ...]:
 
 
 def _allowed(where: str, term: Term) -> Term:
-    """The term, unless it is an event or follows from the vehicle: then SceneError."""
+    """The term. Raises SceneError if it is an event, or a term that follows from the vehicle."""
     if not term.acts:
         raise refusal(where, term.type, "is an event", "give it in events=[...]")
     if type(term) in (Weight, Restoring):

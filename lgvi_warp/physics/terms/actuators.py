@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Common parts of actuators that a controller drives, or that follow a schedule with lag and rate limit."""
+"""Common parts of actuators that follow a controller or a schedule, with lag and rate limit."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ SCHEDULE = ("times", "command_schedule")
 
 
 def are_finite(values: Any) -> bool:
-    """Return whether these are finite numbers."""
+    """Return whether values are finite numbers."""
     try:
         return bool(np.all(np.isfinite(np.asarray(values, float))))
     except (TypeError, ValueError):
@@ -34,13 +34,13 @@ def are_finite(values: Any) -> bool:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Commanded(Term):
-    """A term of n units whose `command` (n,) is held, or follows `command_schedule` (k, n) at `times` (k,). Abstract."""
+    """Base class of terms with n units, a constant `command` (n,) or `command_schedule` (k, n) at `times` (k,). Abstract."""
 
     timed: ClassVar[bool] = True
     driven_fields: ClassVar[tuple[str, ...]] = ("command", *SCHEDULE)
 
     def settle_commands(self: Any, count: int) -> None:
-        """Let the schedule follow from commands that are held, and the reverse; for use before the fields are checked."""
+        """Set the schedule from constant commands, or the commands from the schedule, before the fields are checked."""
         first = first_row(self.command_schedule)
         both = self.command is not None and self.command_schedule is not None
         object.__setattr__(self, "commanded_twice", both and not np.array_equal(first, self.command))
@@ -60,7 +60,7 @@ class Commanded(Term):
 
     @property
     def slow(self) -> bool:
-        """Whether some channel follows its command with a lag, or no faster than a rate."""
+        """Whether some channel follows its command with a lag or a rate limit."""
         raise NotImplementedError
 
     @property
@@ -70,12 +70,12 @@ class Commanded(Term):
 
     @property
     def holds(self: Any) -> bool:
-        """Whether its commands are held, so that of its fields `command` acts, and else the schedule."""
+        """Whether the commands are constant, so that the field `command` acts; otherwise the schedule acts."""
         return len(self.command_schedule) == 1
 
     @property
     def idle_fields(self) -> tuple[str, ...]:
-        """The fields of its commands that follow from the others."""
+        """Fields of the commands that follow from the other fields."""
         return SCHEDULE if self.holds else ("command",)
 
     @property
@@ -94,7 +94,7 @@ class Commanded(Term):
 
 
 def motion(term: Any) -> dict[str, bool]:
-    """Way in which a driven actuator's channels follow commands, by the scene's own numbers."""
+    """Whether a driven actuator's channels have a lag and a rate limit, with the scene's numbers."""
     lag, rate = term.time_constant, term.rate_limit
     return {
         "lag": lag is not None and bool(np.any(lag > 0.0)),
@@ -103,7 +103,7 @@ def motion(term: Any) -> dict[str, bool]:
 
 
 def refuse_unread(term: Any, numbers: Numbers) -> None:
-    """Refuse members' lags and rate limits (n, channels) of a driven actuator where the scene has none."""
+    """Refuse members' lags and rate limits (n, channels) of a driven actuator if the scene has none."""
     faults, features = Faults(f"{term.key}."), motion(term)
     acting = {"lag": ("time_constant", lambda x: x > 0.0), "rate": ("rate_limit", lambda x: x < UNLIMITED)}
     for feature, (name, acts) in acting.items():
@@ -120,14 +120,14 @@ def packed_following(
     term: Any, numbers: Numbers, blocks: np.ndarray, shared: np.ndarray | None = None, size: int = 0, work: int = 0,
     words: Mapping[str, int] | None = None, start: float = 0.0,
 ) -> Packed:  # fmt: skip
-    """Pack an actuator whose device code is made by lgvi_kernels.laws.driven or .scheduled.
+    """Pack an actuator whose device code comes from lgvi_kernels.laws.driven or .scheduled.
 
-    numbers: (m, ...) by field: `limit`, where it has them `time_constant` and `rate_limit`, and if not driven the schedule.
-    blocks: Other rows of each channel, (m, channels, rows). shared: Rows behind those of all channels, (m, rows).
-    work: Rows to work with that the device code has of its own. words: Further whole numbers of the device struct.
-    start: When members start [s].
-    Returns: Rows of each channel: the blocks, limit, 1 / lag and limit of the rate; its schedule; the shared rows; and the
-        memory of places, where they move: 0 of a driven actuator, else the command at the start.
+    numbers: {field: (m, ...)} of `limit`, `time_constant` and `rate_limit` if given, and the schedule if not driven.
+    blocks: Other rows of each channel, (m, channels, rows). shared: Rows after those of all channels, (m, rows).
+    work: Number of the device code's own scratch rows. words: Further whole numbers of the device struct.
+    start: Start time of members [s].
+    Returns: Rows of each channel (blocks, limit, 1 / lag, rate limit), schedules, and shared rows. The memory holds the
+        positions of channels that move, at first 0 for a driven actuator, else the command at the start.
     """
     limit = numbers["limit"]
     none = np.zeros_like(limit)
@@ -158,9 +158,9 @@ def packed_following(
 
 
 def within_limits(times: np.ndarray, schedule: np.ndarray, limit: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Schedules (1 or n, k, units) kept within limits (1 or n, units), with the times (1 or n, k) at which they reach them.
+    """Clip schedules (1 or n, k, units) to limits (1 or n, units), and add the times at which they reach the limits.
 
-    Returns: Times and commands; a member whose command does not reach its limit where another's does has one time twice.
+    Returns: Times and commands. If only some members reach a limit, the others have one time twice.
     """
     if np.all(np.abs(schedule) <= limit[:, None]):
         return times, schedule
@@ -180,9 +180,9 @@ def within_limits(times: np.ndarray, schedule: np.ndarray, limit: np.ndarray) ->
 
 
 def pieces(times: np.ndarray, schedule: np.ndarray) -> np.ndarray:
-    """Rows of schedules (1 or n, k, units) as lgvi_kernels.laws.scheduled reads them: see there.
+    """Rows of schedules (1 or n, k, units) in the form that lgvi_kernels.laws.scheduled reads.
 
-    times: (1 or n, k) [s]; equal ones are a jump.
+    times: (1 or n, k) [s]; equal times are a jump.
     """
     times, schedule = repeated(times, schedule)
     span = np.diff(times, axis=1)
@@ -196,7 +196,7 @@ def pieces(times: np.ndarray, schedule: np.ndarray) -> np.ndarray:
 
 
 def first_row(schedule: Any) -> Any:
-    """Commands (units,) at the first time of a schedule (k, units); 0.0 where there is none, or none that can be read."""
+    """Commands (units,) at the first time of a schedule (k, units); 0.0 if there is no valid schedule."""
     try:
         return np.atleast_2d(np.array(schedule, dtype=np.float64))[0] if schedule is not None else 0.0
     except (TypeError, ValueError, IndexError, OverflowError):
@@ -206,8 +206,8 @@ def first_row(schedule: Any) -> Any:
 def refuse_idle(term: Any, numbers: Numbers, rate: str, remembers: np.ndarray, remedy: str) -> None:
     """Refuse members' numbers (n, ...) that would have no effect, since the scene's kernel does not read them.
 
-    That is `command` in a scene with a schedule and the reverse, unless a controller drives the term; and numbers of a memory
-    that the scene does not have, where those of a member need it (`remembers`, (n, units)).
+    Unless a controller drives the term, these are `command` in a scene with a schedule, and a schedule in a scene with a
+    constant command. In addition, numbers `rate` that need a memory (`remembers`, (n, units)) if the scene has none.
     """
     faults = Faults(f"{term.key}.")
     unread = {}

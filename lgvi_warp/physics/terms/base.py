@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The base class of every term: numbers with units, checked, any of which may vary by member, and how the kernel gets them."""
+"""The base class of every term: checked numbers with units that may vary by member, and their packing for the kernel."""
 
 from __future__ import annotations
 
@@ -39,15 +39,15 @@ class PackingContext:
 
     Args:
         parameters: All parameters of the scene by name ("vehicle.mass"), each of shape (1, ...) or (n, ...).
-        frame: Axes and origins in which the kernel keeps the vehicle; the forces are taken about `frame.forces`.
+        frame: Axes and origins of the vehicle in the kernel; forces act about `frame.forces`.
         members: Indices of the members, shape (n,).
         seed: Seed of the ensemble.
         h: Step [s].
-        aligned: Whether, for every member of the run, the kernel's axes are the user's up to their order and sense, and the
-            origin of the forces is the user's; False by default.
-        time: When the members start, or go on [s]; 0 by default.
-        remembered: What the term remembers where they go on, (n, rows) as in `Packed.memory`; None, the default, for nothing.
-        given: The standard normals of these members, where the call gives them; None, the default, for those of counters.
+        aligned: Whether all members of the run have the user's axes in the kernel, up to order and sign, and the user's
+            origin for the forces; False by default.
+        time: Time at which the members start or continue [s]; 0 by default.
+        remembered: Memory of the term if members continue, (n, rows) as in `Packed.memory`; None, the default, if they start.
+        given: Standard normal numbers that the call gives for these members; None, the default, to draw them from counters.
     """
 
     parameters: Numbers
@@ -67,7 +67,7 @@ class PackingContext:
             term: A term of the scene.
 
         Returns:
-            Its numbers by field, each of shape (1, ...) or (n, ...).
+            The term's numbers by field, each of shape (1, ...) or (n, ...).
         """
         return own(term, self.parameters)
 
@@ -77,17 +77,17 @@ MOST_UNROLLED = 12
 
 
 class Packed(NamedTuple):
-    """A term's numbers as its device code reads them; the leading dimension n is 1 where all members share them.
+    """A term's numbers in the form that its device code reads; the leading dimension n is 1 if all members share them.
 
     Args:
         values: The fields of the device struct by name: numbers (n,), vectors (n, 3) in the kernel's axes, whole numbers,
             or whole numbers (n,).
-        rows: The term's rows of the device table, shape (n, rows), or several such arrays, which stand side by side, each
-            with an n of its own; None for none.
-        memory: What the term remembers from step to step, at the start, shape (n, rows); None for none.
+        rows: The term's rows of the device table, shape (n, rows), or several such arrays side by side, whose n may be 1 or
+            n independently; None for no rows.
+        memory: The term's memory at the start, which it keeps from step to step, shape (n, rows); None for no memory.
         work: Number of scratch rows that the device code may overwrite during one call.
-        normals: Standard normals that the call gives it, shape (n, rows): more rows of the table, behind its own, where the
-            field `key` of the struct finds them; None for none.
+        normals: Standard normal numbers given by the call, shape (n, rows). These are further rows of the table after the
+            term's own; the field `key` of the struct refers to them. None for no such numbers.
     """
 
     values: dict[str, Any]
@@ -98,7 +98,7 @@ class Packed(NamedTuple):
 
 
 class Inner(NamedTuple):
-    """Contribution of a mass that moves in the vehicle to its momenta and energy, each (k, n, ...).
+    """Contribution of a mass that moves in the vehicle to the vehicle's momenta and energy, each (k, n, ...).
 
     Args:
         momenta: Linear and angular momentum about the body's origin, (k, n, 6) [N s, N m s], body axes.
@@ -128,26 +128,26 @@ def number(
     """Declare a numeric field of a term.
 
     Args:
-        shape: Shape of the field. It may contain a name such as "k": a length that is free, but equal in all fields that
+        shape: Shape of the field. It may contain a name such as "k", for a length that is free but equal in all fields that
             use the same name.
-        unit: Unit of the field, as faults show it; "1" for none.
-        default: Value where the user gives none; without it the field must be given.
-        least: Smallest value that is allowed, in the field's unit.
-        most: Largest value that is allowed, in the field's unit.
+        unit: Unit of the field in error messages; "1" for no unit.
+        default: Value if the user gives none; without a default the field is required.
+        least: Smallest allowed value, in the field's unit.
+        most: Largest allowed value, in the field's unit.
         above: Bound that every value must exceed, in the field's unit.
-        rising: Whether the values must rise, as places of a table do; False by default.
-        axes: How `Term.packed` turns the field for the device: "vector" of the body, into the kernel's axes; "point" of the
-            body, in these axes from the origin of the forces; None, the default, not at all: a number without axes, or
-            inertial ones.
-        optional: Whether the field may be None after construction, and then is no parameter; False by default.
+        rising: Whether the values must rise, like the depths of a table; False by default.
+        axes: Conversion by `Term.packed` for the device. "vector": a vector in body axes is converted to the kernel's axes.
+            "point": a point of the body is also shifted to the origin of the forces. None, the default: no conversion, for
+            numbers without axes or in inertial axes.
+        optional: Whether the field may be None after construction; it is then not a parameter. False by default.
         infinite: Whether the values may be infinite; False by default.
-        integer: Whether the values must be whole numbers, as counts are; False by default.
+        integer: Whether the values must be whole numbers, like counts; False by default.
 
     Returns:
         A dataclass field with shape, unit, bounds and axes in its metadata.
 
     Raises:
-        ValueError: If `axes` is none of these.
+        ValueError: If `axes` has another value.
     """
     if axes not in ("vector", "point", None):
         raise ValueError(f"axes = {axes!r} is not known. Give 'vector', 'point' or None")
@@ -156,53 +156,53 @@ def number(
 
 
 def word_of(item: dataclasses.Field[Any]) -> str:
-    """The name of a field in scene files, parameters and faults."""
+    """The name of a field in scene files, parameters and error messages."""
     word = item.name.removesuffix("_")
     return word if keyword.iskeyword(word) else item.name
 
 
 @functools.cache
 def _number_fields(kind: Any) -> tuple[dataclasses.Field[Any], ...]:
-    """Kept, since each pass over a term's numbers asks for them."""
+    """The number fields of a class, cached because each pass over a term's numbers needs them."""
     return tuple(item for item in dataclasses.fields(kind) if "shape" in item.metadata)
 
 
 @explained
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Term(Documented):
-    """A force, a moment or a motion of the water that a scene names.
+    """Base class of terms: a force, a moment or a motion of the water in a scene.
 
     Fields declared by `number` are arrays after construction.
 
-    docs/develop/add_a_force.md shows how to write one. Attributes and methods are for authors.
+    docs/develop/add_a_force.md shows how to write a term. The attributes and methods are for authors of terms.
 
     Args:
-        name: Name of the term in parameters ("name.field"), which tells two terms of one type apart; by default the type.
+        name: Name of the term in parameters ("name.field"), to distinguish two terms of one type; by default the type.
 
     Attributes:
         type: Name in a scene file; files can use it as soon as the class is defined.
-        device: Module of lgvi_kernels.laws by name (by default the type), that of an extension by its path, or any object with
+        device: Name of a module of lgvi_kernels.laws (by default the type), path of an extension's module, or any object with
             the same functions.
         timed: Whether the law depends on time.
-        dissipative: Whether its damping never creates energy.
-        brakes: Whether it takes energy on the whole even if some motions gain by it.
-        strengths: Names of the numbers without which it does nothing.
-        carries: Whether it is a current that is the same everywhere and at all times, which exerts no force.
-        carried: Whether it changes the vehicle's inertia in time.
-        anchored: Whether it holds the vehicle to a place, so that a current does work.
-        accounted: Whether its scene accounts the energy used.
-        memory_rows: Rows of memory, at first 0, of a term that does not define `packed`.
+        dissipative: Whether the term's damping never creates energy.
+        brakes: Whether the term removes energy overall, even if some motions gain energy.
+        strengths: Names of numbers; the term has no effect if all of these are 0.
+        carries: Whether the term is a current that is the same everywhere and at all times, which exerts no force.
+        carried: Whether the term changes the vehicle's inertia in time.
+        anchored: Whether the term ties the vehicle to a fixed point, so that a current does work.
+        accounted: Whether the scene accounts the energy used.
+        memory_rows: Number of rows of memory, 0 at the start, of a term that does not define `packed`.
         key: Name in parameters: `name`, or the type.
-        conserves: Quantities that a motion under it conserves.
+        conserves: Quantities that a motion under this term conserves.
 
     Methods:
         parameters: The numbers that may vary by member.
         number_fields: The fields declared by `lw.laws.number`.
-        check: Note what is wrong with the numbers.
-        beside: The same term, knowing the other terms of its scene.
+        check: Add faults for invalid numbers.
+        beside: The same term, with access to the other terms of its scene.
         packed: The numbers for the device code.
-        potential: Potential energy of a law that follows from one.
-        water: Velocity of the water, of a flow.
+        potential: Potential energy, for a law that has one.
+        water: Velocity of the water, for a term that moves it.
         inner: Momenta and energy of masses that move in the vehicle.
         to_dict: The term as a table of a scene file.
 
@@ -300,17 +300,17 @@ class Term(Documented):
             item: The field.
 
         Returns:
-            By default the shape that the class declares.
+            The shape; by default the one that the class declares.
         """
         shape: tuple[Any, ...] = item.metadata["shape"]
         return shape
 
     @classmethod
     def lanes(cls) -> tuple[tuple[str, int], ...] | None:
-        """The numbers as fields of a device struct that follows from them.
+        """The numbers as fields of a device struct that is generated from them.
 
         Returns:
-            (name, length) of each number, with length 1 for the shape () and 3 for (3,). None where one has another shape.
+            (name, length) of each number, with length 1 for the shape () and 3 for (3,). None if a number has another shape.
         """
         lengths = {(): 1, (3,): 3}
         shapes = {item.name: item.metadata["shape"] for item in cls.number_fields()}
@@ -319,17 +319,17 @@ class Term(Documented):
 
     @property
     def unused(self) -> tuple[str, ...]:
-        """Numbers that do not act: the commands of a term that a controller drives."""
+        """Numbers without effect: the commands of a term that a controller drives."""
         return self.driven_fields if self.driver is not None else ()
 
     def driven_by(self, bus: Any) -> Any:
         """The same term, with the commands of a controller.
 
         Args:
-            bus: Where it finds them; None: the term by itself.
+            bus: Rows of the memory with the commands; None for no controller.
 
         Returns:
-            A copy, or the term where nothing changes.
+            A copy, or the term itself if nothing changes.
         """
         if bus is None and self.driver is None:
             return self
@@ -338,38 +338,38 @@ class Term(Documented):
         return term
 
     def of_vehicle(self, numbers: Numbers) -> Any:
-        """The same term, knowing the vehicle of its scene.
+        """The same term, with access to the vehicle of its scene.
 
         Args:
             numbers: The numbers of the vehicle and its environment by name, each in its own shape.
 
         Returns:
-            By default the term itself.
+            A copy; by default the term itself.
 
         Raises:
-            SceneError: If it does not go with this vehicle.
+            SceneError: If the term does not fit this vehicle.
         """
         return self
 
     def beside(self, terms: Sequence[Term]) -> Any:
-        """The same term in a scene, for one that follows from other terms as well; by default it does not.
+        """The same term, with access to the other terms of its scene, for a term that depends on them.
 
         Args:
             terms: All terms and events of the scene.
 
         Returns:
-            A copy, or the term where nothing changes.
+            A copy, or the term itself if nothing changes, which is the default.
         """
         return self
 
     def beside_account(self, accounted: bool) -> Any:
-        """The same term in a scene that accounts the energy used, or in one that does not.
+        """The same term, in a scene that does or does not account the energy used.
 
         Args:
-            accounted: Whether it does.
+            accounted: Whether the scene accounts the energy used.
 
         Returns:
-            A copy, or the term where nothing changes.
+            A copy, or the term itself if nothing changes.
         """
         if accounted == self.accounted:
             return self
@@ -379,21 +379,21 @@ class Term(Documented):
 
     @property
     def channels(self) -> int:
-        """Number of commands that it takes from a controller; 0, the default, for a term that takes none."""
+        """Number of commands that the term takes from a controller; 0, the default, if it takes none."""
         return 0
 
     @property
     def own_commands(self) -> bool:
-        """Whether it has commands of its own, which no controller may replace; by default False."""
+        """Whether the term has its own commands, which no controller may replace; by default False."""
         return False
 
     @property
     def key(self) -> str:
-        """The name by which parameters refer to this term: its `name`, or its `type` where it has none."""
+        """The name by which parameters refer to this term: its `name`, or its `type` if it has no name."""
         return self.name if isinstance(self.name, str) and self.name else self.type
 
     def repeat(self, count: int, *names: str) -> None:
-        """Give every row of a field the value that was given once; for use before the fields are checked.
+        """Repeat a single value of a field for every row; for use before the fields are checked.
 
         Args:
             count: Number of rows.
@@ -414,7 +414,7 @@ class Term(Documented):
             A new term.
 
         Raises:
-            SceneError: If a value is wrong.
+            SceneError: If a value is invalid.
         """
         faults = Faults()
         faults.keys(self.key, fields, [item.name for item in dataclasses.fields(self) if item.init])
@@ -422,10 +422,10 @@ class Term(Documented):
         return dataclasses.replace(self, **fields)
 
     def check(self, faults: Faults) -> None:
-        """Add a fault for each number that is wrong for reasons beyond its shape and its bounds; by default there is none.
+        """Add a fault for each number that is invalid although its shape and bounds are right; by default there is none.
 
         Args:
-            faults: Collects the faults. It is called only where all shapes and bounds are right.
+            faults: Collects the faults. The method is called only if all shapes and bounds are right.
         """
 
     def parameters(self) -> dict[str, np.ndarray]:
@@ -441,13 +441,13 @@ class Term(Documented):
         }
 
     def unphysical(self, numbers: Numbers) -> dict[str, np.ndarray]:
-        """Members with numbers that this term cannot take: not finite, or out of bounds.
+        """Members with numbers that the term refuses: not finite, or out of bounds.
 
         Args:
             numbers: The term's numbers by field, each of shape (n, ...).
 
         Returns:
-            A mask (n,) for each numeric field, True where the member's number is refused.
+            {numeric field: mask (n,)}, True for a member whose number is refused.
         """
         fields = {word_of(item): item for item in self.number_fields()}
         return {
@@ -456,40 +456,40 @@ class Term(Documented):
         }
 
     def odd_at(self, numbers: Numbers, position: Array) -> Mapping[str, tuple[Array, str]]:
-        """Oddities of members where they start; none by default.
+        """Oddities of members at their start position; none by default.
 
         Args:
             numbers: The term's numbers by field, each of shape (n, ...).
             position: Positions (n, 3) [m].
 
         Returns:
-            By field: which members are odd (n,), and why, a text with {} for the depth.
+            {field: (mask of odd members (n,), reason)}; the reason is a text with {} for the depth.
         """
         return {}
 
     def present(self, numbers: Numbers) -> bool:
-        """Whether any member feels the term; by default where one of its `strengths`, if it names any, is not zero.
+        """Whether the term acts on any member: by default, if it has no `strengths` or one of these is not 0.
 
         Args:
             numbers: The term's numbers by field, each of shape (n, ...).
 
         Returns:
-            False where the term has no effect, so that the kernel leaves its code out.
+            False if the term has no effect; the kernel then leaves its code out.
         """
         return not self.strengths or any(np.any(numbers[name]) for name in self.strengths)
 
     @property
     def memory(self) -> bool:
-        """Whether its device code remembers something from step to step."""
+        """Whether the term's device code keeps a memory from step to step."""
         return self.memory_rows > 0
 
     @property
     def conserves(self) -> frozenset[str]:
-        """Quantities of `CONSERVED` that a motion keeps where this law alone acts.
+        """Quantities of `CONSERVED` that a motion conserves if only this law acts.
 
-        By default it is the energy, for a law whose device code is POTENTIAL and has no other role, if `potential` is defined
-        and does not depend on time; for any other law it is nothing. A law whose potential depends only on depth and on the
-        attitude relative to the vertical conserves all three, and overrides this.
+        By default this is the energy, if the device code is POTENTIAL and has no other role, and `potential` is defined and
+        does not depend on time. Any other law conserves nothing by default. A law whose potential depends only on depth and
+        on the attitude relative to the vertical conserves all three, and overrides this property.
         """
         device = self.device
         follows = getattr(device, "POTENTIAL", False) and type(self).potential is not Term.potential
@@ -499,16 +499,16 @@ class Term(Documented):
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """Sentences on odd numbers, which `lgvi-warp check` and the messages of a run show; by default none."""
+        """Sentences on odd numbers, shown by `lgvi-warp check` and in the messages of a run; by default none."""
         return ()
 
     @property
     def own_events(self) -> tuple[Any, ...]:
-        """Events that the term brings along; by default none."""
+        """Events that the term adds to its scene; by default none."""
         return ()
 
     def check_times(self, faults: Faults, first: float, last: float) -> None:
-        """Add a fault where the term does not know what happens in a run; by default there is none.
+        """Add a fault if the term has no data for a part of the run; by default there is none.
 
         Args:
             faults: Collects the faults.
@@ -517,13 +517,13 @@ class Term(Documented):
         """
 
     def entries(self, numbers: Numbers) -> tuple[str, ...]:
-        """The entries of the term's matrices that some member has, for a term with a `pattern_device`.
+        """The nonzero entries of the term's matrices in some member, for a term with a `pattern_device`.
 
         Args:
             numbers: The term's numbers by field, each of shape (n, ...).
 
         Returns:
-            Words of the device code: "q01" for row 0 and column 1 of the matrix q. By default none.
+            Words for the device code: "q01" stands for row 0 and column 1 of the matrix q. By default none.
         """
         return ()
 
@@ -534,24 +534,24 @@ class Term(Documented):
             aligned: As in `PackingContext`: whether the kernel's axes and origin are the user's.
 
         Returns:
-            The name of a module of lgvi_kernels.laws, the path of another one, or an object with the same functions.
+            The name of a module of lgvi_kernels.laws, the path of another module, or an object with the same functions.
         """
         return self.device
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         """Pack the term's numbers for its device code, in the kernel's axes.
 
-        By default each number is a field of the struct, turned as its `axes` say.
+        By default each number becomes a field of the struct, converted according to its `axes`.
 
         Args:
-            numbers: The term's numbers by field, each of shape (n, ...), n = 1 where members share them.
+            numbers: The term's numbers by field, each of shape (n, ...); n = 1 if members share them.
             context: The scene's parameters, the frame and the run.
 
         Returns:
             The fields of the device struct, and the rows, memory and scratch rows that the device code needs.
 
         Raises:
-            NotImplementedError: If the term does not define it, and has a number of another shape than () and (3,).
+            NotImplementedError: If the term does not define this method and has a number of another shape than () and (3,).
         """
         if self.lanes() is None:
             name = type(self).__name__
@@ -565,11 +565,11 @@ class Term(Documented):
 
     @property
     def first_memory(self) -> np.ndarray | None:
-        """The memory at the start, as `memory_rows` says; None for none."""
+        """The memory at the start, with `memory_rows` rows of 0; None without memory."""
         return np.zeros((1, self.memory_rows)) if self.memory_rows else None
 
     def water(self, numbers: Numbers, position: np.ndarray, time: np.ndarray, parameters: Numbers) -> np.ndarray | None:
-        """Velocity of the water that this term moves; by default it moves none.
+        """Velocity of the water due to this term; by default None.
 
         Args:
             numbers: The term's numbers by field, each of shape (n, ...).
@@ -578,13 +578,13 @@ class Term(Documented):
             parameters: All parameters of the scene, by name.
 
         Returns:
-            Velocity (k, n, 3) [m/s] in inertial axes. None for a law that moves no water, or whose water is not known after
-            the run.
+            Velocity (k, n, 3) [m/s] in inertial axes. None for a law that moves no water, or if the velocity is not known
+            after the run.
         """
         return None
 
     def water_at_start(self, numbers: Numbers, position: np.ndarray, context: PackingContext) -> np.ndarray:
-        """Velocity of the water where members start, or go on; by default that of `water` at that time.
+        """Velocity of the water at the members' start, or where they continue; by default that of `water` at that time.
 
         Args:
             numbers: The term's numbers by field, each of shape (n, ...).
@@ -598,9 +598,9 @@ class Term(Documented):
         return np.zeros_like(position) if still is None else still[0]
 
     def braking(self, numbers: Numbers, speeds: Array, water_density: Array) -> Array:
-        """Braking of the term at some speeds: minus the derivative of its wrench by the velocity, or a bound.
+        """Damping matrix of the term at given speeds: minus the derivative of its wrench by the velocity, or a bound.
 
-        A run without a method looks at it, to choose one that is stable (lgvi_warp.runs.default_method).
+        A run without a given method uses this matrix to choose a stable method (lgvi_warp.runs.default_method).
 
         Args:
             numbers: The term's numbers by field, each of shape (n, ...).
@@ -611,28 +611,28 @@ class Term(Documented):
             Matrices (n, 6, 6) [N s/m, N s, N m s], user's axes and origin.
 
         Raises:
-            NotImplementedError: If the term does not define it: its damping then counts as strong.
+            NotImplementedError: If the term does not define this method; its damping then counts as strong.
         """
         raise NotImplementedError(f"{type(self).__name__} does not tell how strongly it brakes")
 
     def effect(self, numbers: Numbers, parameters: Numbers, speed: Array) -> Array:
-        """Effect of a unit of effort of each channel: thrust of thrusters, the angle of fins.
+        """Wrench of one unit of effort of each channel. An effort is the thrust of a thruster or the angle of a fin.
 
         Args:
             numbers: The term's numbers by field, each of shape (1 or n, ...).
             parameters: All parameters of the scene, by name.
-            speed: Speed ahead (1 or n,) [m/s].
+            speed: Forward speed (1 or n,) [m/s].
 
         Returns:
             Wrenches (1 or n, 6, channels) about the body's origin [N, N m per unit of effort].
 
         Raises:
-            NotImplementedError: If the term does not define it, as an actuator must for `PseudoInverse`.
+            NotImplementedError: If the term does not define this method, which `PseudoInverse` needs of an actuator.
         """
         raise NotImplementedError(f"{type(self).__name__} does not tell what its channels make")
 
     def drive(self) -> Array:
-        """Largest force and torque with which the term drives the vehicle, whatever its motion, by the scene's numbers.
+        """Largest force and torque with which the term drives the vehicle in any motion, with the scene's numbers.
 
         Returns:
             Sizes along and about the body's axes (6,) [N, N m]; by default zero.
@@ -640,7 +640,7 @@ class Term(Documented):
         return np.zeros(6)
 
     def potential(self, numbers: Numbers, position: Array, attitude: Array, parameters: Numbers) -> Array | float:
-        """Potential energy of the law at sampled states.
+        """Potential energy of the term at sampled states.
 
         Args:
             numbers: The term's numbers by field, each of shape (n, ...).
@@ -649,7 +649,7 @@ class Term(Documented):
             parameters: All parameters of the scene, by name.
 
         Returns:
-            Energy (k, n) [J]; 0 for a law without a potential.
+            Energy (k, n) [J]; 0 for a term without a potential.
         """
         return 0.0
 
@@ -664,7 +664,8 @@ class Term(Documented):
             parameters: All parameters of the scene, by name.
 
         Returns:
-            What it adds to those of a vehicle with constant inertia; None, the default, for nothing, or what is not known.
+            The additions to the values of a vehicle with constant inertia. None, the default, if there are none or they are
+            not known.
         """
         return None
 
@@ -672,18 +673,18 @@ class Term(Documented):
         """The term as a table of a scene file.
 
         Returns:
-            `type`, `name` where it has one, and every field that is not None, arrays as lists.
+            `type`, `name` if given, and every field that is not None; arrays become lists.
         """
         return self.table_without(())
 
     def table_without(self, names: Collection[str]) -> dict[str, Any]:
-        """The table of `to_dict` without some fields, whose numbers no list is made of.
+        """The table of `to_dict` without some fields, whose arrays are then not converted to lists.
 
         Args:
-            names: Names of the fields that are left out.
+            names: Names of the fields to leave out.
 
         Returns:
-            As `to_dict`.
+            The table, as of `to_dict`.
         """
         content: dict[str, Any] = {"type": self.type} | ({"name": self.name} if self.name else {})
         for item in dataclasses.fields(self):
@@ -694,7 +695,7 @@ class Term(Documented):
 
 
 def own(term: Term, parameters: Numbers) -> dict[str, np.ndarray]:
-    """The numbers of one term by field, out of those of a scene by name."""
+    """The numbers of one term by field, selected from those of a scene by name."""
     return {name: parameters[f"{term.key}.{name}"] for name in term.parameters()}
 
 
@@ -742,7 +743,7 @@ def _checked(
 
 
 def _amount(shape: tuple[Any, ...]) -> str:
-    """Count of numbers in a shape, in words."""
+    """Text that states how many numbers a shape has."""
     return f"numbers of shape {shape}" if shape else "a number"
 
 
@@ -760,21 +761,21 @@ def _outside(field: dataclasses.Field[Any], values: np.ndarray) -> np.ndarray:
 
 
 def _falling(field: dataclasses.Field[Any], values: np.ndarray) -> Any:
-    """Mask (n,) of the members whose values (n, k) of a field do not rise, though they must; False where they need not."""
+    """Mask (n,) of the members whose values (n, k) of a field must rise but do not; False if they need not rise."""
     if not field.metadata["rising"]:
         return False
     return np.any(np.diff(np.nan_to_num(values)) <= 0.0, axis=1)
 
 
 def _fractional(field: dataclasses.Field[Any], values: np.ndarray) -> Any:
-    """Mask (n,) of the members whose values (n, ...) of a field are not whole; False where they need not be."""
+    """Mask (n,) of the members whose values (n, ...) of a field must be whole but are not; False if they need not be."""
     if not field.metadata["integer"]:
         return False
     return np.any(values.reshape(len(values), -1) != np.rint(values.reshape(len(values), -1)), axis=1)
 
 
 def _whole_near(array: np.ndarray, meta: Mapping[str, Any]) -> str:
-    """The whole numbers nearest to one, within its bounds; of several, words."""
+    """The whole numbers nearest to a single number, within its bounds, as a remedy; a general text for several numbers."""
     if array.ndim:
         return "whole numbers"
     near = {float(value) for value in (np.floor(array), np.ceil(array)) if meta["least"] <= value <= meta["most"]}
@@ -785,16 +786,16 @@ def knots(at: np.ndarray, values: np.ndarray, steps: bool = False) -> np.ndarray
     """Rows of a table that the device reads by `table1` and `table3`: linear between its knots, constant outside.
 
     Args:
-        at: Places of the knots (1 or n, k), rising, in the unit of the table's argument; k is 2 or more.
-        values: Values there, (1 or n, k, 1) for `table1`, (1 or n, k, 3) for `table3`.
-        steps: Whether each value holds up to the next knot, and then jumps.
+        at: Arguments at the knots (1 or n, k), rising, in the unit of the table's argument; k is 2 or more.
+        values: Values at the knots, (1 or n, k, 1) for `table1`, (1 or n, k, 3) for `table3`.
+        steps: Whether each value is constant up to the next knot, and then jumps.
 
     Returns:
-        Rows (1 or n, d + (k - 1) (d + 2)), d numbers a value: the first value, then of each interval its place, 1 / length and
-        the change of the value. `table1` and `table3` take k - 1 as their count.
+        Rows (1 or n, d + (k - 1) (d + 2)), where a value has d numbers: the first value, then for each interval its start,
+        1 / length and the change of the value. `table1` and `table3` take k - 1 as their count.
 
     Raises:
-        SceneError: at or values are no numbers of such shapes.
+        SceneError: If `at` or `values` are not numbers of these shapes.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -841,7 +842,7 @@ AnyTerm = TypeVar("AnyTerm", bound=Term)
 
 
 def rows_of(value: Any) -> int:
-    """Count the rows of a field that is not checked yet."""
+    """Count the rows of a field before it is checked."""
     return len(np.atleast_1d(np.asarray(value, dtype=object)))
 
 
@@ -873,7 +874,7 @@ MOST_TERMS = 1000
 
 
 def check_list(key: str, entries: Any, example: str) -> list[Any]:
-    """Read a list; refuse what is none, or has more terms or events than a scene may have."""
+    """Read a list of terms or events; refuse a value that is not a list, or a list longer than a scene may have."""
     listed = items_of(entries)
     if listed is None:
         raise refusal(key, entries, "is not a list", example)

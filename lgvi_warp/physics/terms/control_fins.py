@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Control fins: fins that turn about their span to a command."""
+"""Control fins, which turn about their span and follow a command."""
 
 from __future__ import annotations
 
@@ -29,36 +29,37 @@ WORK_ROWS = 7
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ControlFins(Commanded, Fins):
-    """Fins that are turned about their span by a deflection, which follows a command.
+    """Fins that turn about their span; their deflection follows a command.
 
-    A positive deflection lifts along +normal where the flow comes from ahead. It is the command within `limit`, followed no
-    faster than `rate_limit`, and after a first-order lag; at t = 0 it equals the command. One number stands for n equal ones.
+    A positive deflection lifts along +normal if the flow comes from ahead. The deflection follows the command within
+    `limit`, after a first-order lag and at most at `rate_limit`; at t = 0 it equals the command. A single number stands for
+    n equal numbers.
 
     Args:
-        position: Where each fin's force acts, (n, 3) [m] from the body's origin.
+        position: Point at which each fin's force acts, (n, 3) [m] from the body's origin.
         chord: Direction from trailing to leading edge, (n, 3), of any length but 0.
-        normal: Direction of lift, (n, 3), of any length but 0; it is made orthogonal to the chord.
+        normal: Direction of lift, (n, 3), of any length but 0; its component along the chord is removed.
         area: Area A, (n,) [m2].
         drag: Drag coefficient along the flow, (n,).
-        drag_normal: Drag coefficient that grows with sin^2 a, (n,); 0 by default.
-        lift_slope: Slope of the lift coefficient, (n,) [1/rad]; where a table of lift is given, the factor of its
-            coefficients, 1 by default.
+        drag_normal: Drag coefficient that grows with sin^2 a, where a is the angle of attack, (n,); 0 by default.
+        lift_slope: Slope of the lift coefficient, (n,) [1/rad]. With a table of lift, a factor on its coefficients, 1 by
+            default.
         lift_angles: Angles of attack of a table of lift, (k,) [rad], rising from 0; none by default.
-        lift_coefficients: Lift coefficients at these angles, (k,) [1]; at negative angles they have the opposite sign.
-            Between the angles they are linear, beyond the last one constant.
-        flow_angle: Whether the angle of the flow adds to the deflection, True by default. If not, lift is rho A/2
-            lift_slope d u u for a deflection d and a flow u along the chord, and drag rho A/2 (drag + drag_normal d^2) |u|
-            u.
-        limit: Largest deflection either way, (n,) [rad]; 0.35 by default.
-        rate_limit: Largest rate of the deflection, (n,) [rad/s]; none by default.
-        time_constant: Time constant of the lag of the deflection, (n,) [s]; none by default.
-        command: Deflection that is held, (n,) [rad].
+        lift_coefficients: Lift coefficients at these angles, (k,) [1], linear between the angles and constant beyond the
+            last one. At negative angles they have the opposite sign.
+        flow_angle: Whether the angle of the flow adds to the deflection, True by default. If False, let d be the deflection
+            and u the flow along the chord: the lift is rho A/2 lift_slope d u^2, and the drag is
+            rho A/2 (drag + drag_normal d^2) |u| u.
+        limit: Largest size of the deflection, (n,) [rad]; 0.35 by default.
+        rate_limit: Largest rate of the deflection, (n,) [rad/s]; by default no limit.
+        time_constant: Time constant of the lag of the deflection, (n,) [s]; by default no lag.
+        command: Constant deflection, (n,) [rad].
         times: Times of the schedule, (k,) [s], rising.
         command_schedule: Deflections at these times, (k, n) [rad], linear between them; instead of `command`.
 
     Raises:
-        SceneError: As `Fins`, and where times or angles do not rise, the command is given twice, or neither a slope nor a
-            table of lift is given.
+        SceneError: If times or angles do not rise, the command is given twice, neither a slope nor a table of lift is given,
+            or for a reason listed at `Fins`.
     """
 
     type: ClassVar[str] = "control_fins"
@@ -145,7 +146,7 @@ class ControlFins(Commanded, Fins):
 
     @property
     def stands(self) -> bool:
-        """Whether every fin stands where it starts: its command is held, and it starts there."""
+        """Whether every fin keeps its start deflection, because its command is constant."""
         return self.driver is None and self.holds
 
     @property
@@ -164,7 +165,7 @@ class ControlFins(Commanded, Fins):
         return super().entries(self._turned(numbers) if self.device_in(True) == "fins" else numbers)
 
     def _turned(self, numbers: Numbers) -> Numbers:
-        """The numbers of fins that stand: fixed fins, whose chords and normals are turned by the commands."""
+        """The numbers of equivalent fixed fins, whose chords and normals are turned by the constant commands."""
         chord, normal = unit_directions(numbers)
         angle = np.clip(numbers["command"], -numbers["limit"], numbers["limit"])[..., None]
         c, s = np.cos(angle), np.sin(angle)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""An ideal actuator, which makes the wrench that a controller demands."""
+"""An ideal actuator, which produces the wrench that a controller demands."""
 
 from __future__ import annotations
 
@@ -17,14 +17,15 @@ COMPONENTS = ("X", "Y", "Z", "K", "M", "N")
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ControlWrench(Term):
-    """An ideal actuator: force and torque about the body's origin that a controller commands; none without a controller.
+    """An ideal actuator: force and torque about the body's origin commanded by a controller; zero without a controller.
 
-    n' = (command - n) / time constant for each of its components, |n'| at most the rate limit, the command within the limit.
+    Each component n follows n' = (command - n) / time constant, with |n'| at most the rate limit and the command within the
+    limit.
 
     Args:
         limit: Largest size of each component, (6,) [N, N m]; 1e6 by default.
-        rate_limit: Largest rate of each component, (6,) [N/s, N m/s]; none by default.
-        time_constant: Time constant of the lag of each component, (6,) [s]; 0 by default, no lag.
+        rate_limit: Largest rate of each component, (6,) [N/s, N m/s]; by default no limit.
+        time_constant: Time constant of the lag of each component, (6,) [s]; 0 by default, for no lag.
     """
 
     type: ClassVar[str] = "control_wrench"

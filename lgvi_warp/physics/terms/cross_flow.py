@@ -16,15 +16,15 @@ from lgvi_warp.physics.terms.strips import GAUSS, StripTerm, across
 class CrossFlow(StripTerm):
     """Cross-flow drag of a slender hull, by strips: force per length -rho/2 Cd D |w| w (Hoerner 1965; Fossen 2021, chapter 8).
 
-    w is the flow across the hull at the strip. Between stations the product Cd D is linear.
+    w is the velocity of the strip across the hull, relative to the water. Between stations the product Cd D is linear.
 
     Args:
-        stations: Places along the body's x axis, (k,) [m], rising; two or more.
+        stations: Positions along the body's x axis, (k,) [m], rising; two or more.
         diameters: Breadth D of the hull across the flow, (k,) [m].
         drag_coefficient: Drag coefficient Cd, (k,), or one number for all stations.
 
     Raises:
-        SceneError: If stations do not rise or are fewer than two; or a number is invalid (see `Term`).
+        SceneError: If stations do not rise or are fewer than two, or a number is invalid (see `Term`).
     """
 
     type: ClassVar[str] = "cross_flow"

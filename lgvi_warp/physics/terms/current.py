@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Currents: how the water moves. Momenta are relative to the water, so that drag and lift need no further code."""
+"""Currents. Momenta are relative to the water, so that drag and lift need no further code."""
 
 from __future__ import annotations
 
@@ -38,14 +38,14 @@ class Current(Term):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CurrentProfile(Term):
-    """A current that varies with depth by a table, linear between its depths and constant outside.
+    """A current that varies with depth, as a table that is linear between its depths and constant outside.
 
     Args:
         depths: Depths, (k,) [m], rising.
         velocities: Velocities of the water at these depths, (k, 3) [m/s], in inertial axes.
 
     Raises:
-        SceneError: If depths do not rise; or a number is invalid (see `Term`).
+        SceneError: If depths do not rise, or a number is invalid (see `Term`).
     """
 
     type: ClassVar[str] = "current_profile"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A current on a grid in space and time, such as an ocean model gives."""
+"""A current on a grid in space and time, such as that of an ocean model."""
 
 from __future__ import annotations
 
@@ -24,28 +24,30 @@ ROUND_OFF = 1e-9
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CurrentField(InFile, Term):
-    """A current on a regular grid in north, east and depth, and in time if that is given: linear in each, held outside.
+    """A current on a regular grid in north, east, depth and, if `times` are given, time; linear between the nodes.
 
-    Several fields of one grid, of an ensemble forecast say, are scenarios: `scenario` says which, and may vary by member.
+    Several fields on one grid, for example of an ensemble forecast, are scenarios. `scenario` selects one of them, and may
+    vary by member.
 
     Args:
         velocities: Velocities of the water at the nodes, (x, y, z, 3) [m/s] in inertial axes; (t, x, y, z, 3) with `times`;
-            (s, t, x, y, z, 3), or (s, x, y, z, 3) without `times`, with scenarios.
-        origin: Place of the first node, (3,) [m]: north, east, depth; zeros by default.
-        spacing: Distance of the nodes along north, east and depth, (3,) [m].
-        times: Time of the first field and time between two of them, (2,) [s]; None, the default: they do not change.
-        scenario: Which of the scenarios, a whole number from 0; 0 by default.
-        outside: What happens outside the grid: "hold", the default, the nearest node's velocity; or "stop": a member that
-            leaves it stops with the status OUTSIDE, and a run that ends after the last time is refused.
+            with scenarios (s, t, x, y, z, 3), or (s, x, y, z, 3) without `times`.
+        origin: Position of the first node, (3,) [m]: north, east, depth; zeros by default.
+        spacing: Distance between nodes along north, east and depth, (3,) [m].
+        times: Time of the first field and time step between fields, (2,) [s]; None, the default, for a constant field.
+        scenario: Index of the scenario, a whole number from 0; 0 by default.
+        outside: Treatment of members outside the grid. "hold", the default, uses the velocity at the nearest edge. With
+            "stop", a member that leaves the grid stops with the status OUTSIDE, and a run that ends after the last time is
+            refused.
 
     Methods:
-        from_dataset: Currents of an ocean model.
+        from_dataset: Current from the data set of an ocean model.
 
     Raises:
-        SceneError: If the shape of `velocities` does not fit; or a number is invalid (see `Term`).
+        SceneError: If the shape of `velocities` does not fit, or a number is invalid (see `Term`).
 
     Examples:
-        An eddy that turns once in 1,000 s about the middle of a square of 200 m.
+        An eddy that turns once in 1,000 s about the centre of a square with sides of 200 m.
 
         >>> import lgvi_warp as lw
         >>> import numpy as np
@@ -92,44 +94,43 @@ class CurrentField(InFile, Term):
         scenario: float = 0.0,
         name: str = "",
     ) -> Self:
-        """Read a current from a data set in the CF conventions, as CMEMS, HYCOM and ROMS write them.
+        """Read a current from a data set in the CF conventions, such as those of CMEMS, HYCOM and ROMS.
 
-        Only the region and the times that are asked for are read, field by field. Latitudes and longitudes become metres in
-        the plane that touches the Earth at `origin`, and velocities are turned into its axes.
+        Only the requested region and times are read, field by field. Latitudes and longitudes are converted to metres in the
+        plane that touches the Earth at `origin`, and velocities to its axes.
 
         Args:
             source: Path of a NetCDF file, or an xarray Dataset.
             origin: Latitude and longitude [deg] of the origin of the inertial axes, (2,).
-            start: Moment that is t = 0: a datetime, or a text as ISO 8601 writes it, in UTC where it names no zone; by
-                default the first of the data.
-            region: Least and largest north, east and depth that are read, (3, 2) [m]; by default all the data.
-            speed: Bound of the speed over ground [m/s], in place of `region`: read is what a vehicle that starts at `around`
-                can reach in `duration`.
-            duration: Time from the start on that is read [s]; by default to the end of the data.
-            around: Where members start [m], (3,), for `speed`; zeros by default.
-            variables: Names of the variables: eastward and northward, and upward if there is one; by default those with the
-                standard_name, or the name, that models give them.
-            spacing: Distances of the nodes that are made [m], (3,); by default at least as fine as the data's own, in depth
-                with 100 levels at most.
-            fill: What stands where values are missing, on land and below the sea floor: "nearest", the default, "zero", or
-                "refuse".
-            checksum: That of the numbers of a file, so that another file is not taken for it; by default whatever is there.
-            attributes: Attributes that a file lacks or has wrong, for instance {"u.units": "m s-1"}; "name" alone is one of
-                the file itself.
-            outside: As of the class, but "stop" by default.
-            scenario: As of the class. Scenarios are the dimension `realization`, `member`, `ensemble` or `number`.
+            start: Date and time of t = 0: a datetime or a text in ISO 8601, in UTC unless it names a time zone; by default
+                the first time of the data.
+            region: Least and largest north, east and depth to read, (3, 2) [m]; by default all the data.
+            speed: Largest speed over ground [m/s], to compute the region instead of giving `region`: the region that a
+                vehicle starting at `around` can reach in `duration`.
+            duration: Length of the time from the start to read [s]; by default to the end of the data.
+            around: Start position of members [m], (3,), for `speed`; zeros by default.
+            variables: Names of the eastward, northward and, if there is one, upward velocity; by default the variables with
+                the usual standard_name or the usual name in models.
+            spacing: Distances between the nodes of the regular grid [m], (3,); by default at least as fine as the data, with
+                at most 100 levels in depth.
+            fill: Treatment of missing values, on land and below the sea floor: "nearest", the default, "zero", or "refuse".
+            checksum: Checksum of the numbers of the file, so that a changed file is refused; by default it is not checked.
+            attributes: Missing or wrong attributes of the file, for instance {"u.units": "m s-1"}; "name" without a variable
+                is an attribute of the file itself.
+            outside: As in the class, but "stop" by default.
+            scenario: As in the class. Scenarios are the dimension `realization`, `member`, `ensemble` or `number`.
             name: As in `Term`.
 
         Returns:
-            The field. Its `data` says how many values were missing, and what the regular grid changed [m/s].
+            The field. Its `data` has the number of missing values, and the largest change by the regular grid [m/s].
 
         Raises:
-            SceneError: If the data set has no velocities that are known, axes that are not understood, or neither the
-                region nor the times; with the remedy.
+            SceneError: If the data set has no known velocities, has unknown axes, or does not cover the region or the times;
+                the message names the remedy.
             MissingExtra: If xarray, a reader of NetCDF or pyproj is not installed.
 
         Examples:
-            A shear of 1 m/s in 0.1 degrees to the north, and where it is 5 km north of the origin.
+            A shear of 1 m/s per 0.1 degrees to the north, and its velocity 5 km north of the origin.
 
             >>> import lgvi_warp as lw
             >>> import numpy as np
@@ -265,11 +266,11 @@ class CurrentField(InFile, Term):
 
 
 def _with_data(field: Any, data: Any) -> Any:
-    """The field, which knows where its numbers come from."""
+    """The field, with the source of its numbers."""
     object.__setattr__(field, "data", data)
     return field
 
 
 def _no_scenario(scenario: np.ndarray, count: int) -> np.ndarray:
-    """Mask of numbers (n,) that are no index of so many scenarios."""
+    """Mask of numbers (n,) that are not an index of one of `count` scenarios."""
     return (scenario != np.rint(scenario)) | (scenario > count - 1)

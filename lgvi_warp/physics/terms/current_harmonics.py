@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A uniform current that is a sum of harmonics in time, such as tides."""
+"""A uniform current that is a sum of harmonics in time, such as a tidal current."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Harmonics(Term):
-    """A sum of components in time, each with an amplitude, a period and a phase. Abstract.
+    """Base class of sums of harmonics in time, each with an amplitude, a period and a phase. Abstract.
 
     Args:
-        amplitudes: Amplitudes, k of them.
+        amplitudes: Amplitudes of the k harmonics.
         periods: Periods, (k,) [s], above 0.
         phases: Phases at t = 0, (k,) [rad]; 0 by default.
     """
@@ -44,7 +44,7 @@ class CurrentHarmonics(Harmonics):
         phases: Phases at t = 0, (k,) [rad]; 0 by default.
 
     Raises:
-        SceneError: If a period is not above 0; or a number is invalid (see `Term`).
+        SceneError: If a period is not above 0, or a number is invalid (see `Term`).
     """
 
     type: ClassVar[str] = "current_harmonics"

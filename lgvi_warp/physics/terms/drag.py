@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Drag: by its exact flow where the axes allow it, else as a damping matrix; and full 6x6 drag matrices."""
+"""Drag, solved exactly if the axes allow it and otherwise as a damping matrix; and full 6x6 drag matrices."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ PARTS = {
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Drag(Term):
-    """Drag along each body axis by itself: force = -(linear + quadratic |v|) v, torque likewise (Fossen 2021, section 8.1).
+    """Drag along and about each body axis: force = -(linear + quadratic |v|) v, torque likewise (Fossen 2021, section 8.1).
 
-    Velocities are relative to the water, about the user's origin.
+    Velocities are relative to the water, at the user's origin.
 
     Args:
-        linear: Linear coefficients, (6,) [N s/m, N m s], from 0; 0 by default.
-        quadratic: Quadratic coefficients, (6,) [N s2/m2, N m s2], from 0; 0 by default.
+        linear: Linear coefficients, (6,) [N s/m, N m s], at least 0; 0 by default.
+        quadratic: Quadratic coefficients, (6,) [N s2/m2, N m s2], at least 0; 0 by default.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -53,7 +53,7 @@ class Drag(Term):
     quadratic: Any = number((6,), "N s2/m2, N m s2", ZEROS, least=0.0)
 
     def parts(self, numbers: Numbers) -> tuple[str, ...]:
-        """Parts of the exact flow that some member has.
+        """Parts of the exact solution that some member needs.
 
         Args:
             numbers: The term's numbers by field, each of shape (n, 6).
@@ -69,7 +69,7 @@ class Drag(Term):
         return entry_words(l=matrices["linear"], q=matrices["quadratic"])
 
     def packed_exact(self, numbers: Numbers, frame: Frame, scale: np.ndarray) -> Packed:
-        """The numbers for the exact flow of drag, which acts on each momentum by itself.
+        """The numbers for the exact solution of drag, which acts on each momentum separately.
 
         Args:
             numbers: The term's numbers by field, each of shape (n, 6).
@@ -77,7 +77,8 @@ class Drag(Term):
             scale: The factor by which the kernel divides momenta, (1,) or (n,).
 
         Returns:
-            Linear coefficients over inertia [1/s], and quadratic ones over inertia squared times `scale`.
+            Linear coefficients divided by inertia [1/s], and quadratic coefficients divided by inertia squared, times
+            `scale`.
         """
         inertia = {"force": np.einsum("nii->ni", frame.M), "torque": frame.J}
         values = {}
@@ -88,7 +89,7 @@ class Drag(Term):
         return Packed(values)
 
     def packed_directions(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """The numbers for drag along one axis after the other, where inertia is coupled.
+        """The numbers for drag along one axis after the other, for coupled inertia.
 
         Args:
             numbers: The term's numbers by field, each of shape (n, 6).
@@ -117,14 +118,14 @@ class Drag(Term):
         return packed_matrix(matrices["linear"], matrices["quadratic"], context)
 
     def per_speed(self, numbers: Numbers, speeds: np.ndarray) -> np.ndarray:
-        """Drag over speed along and about each axis.
+        """Drag divided by speed, along and about each axis.
 
         Args:
             numbers: The term's numbers by field, each of shape (n, 6).
             speeds: Sizes of velocity and angular velocity, (n, 6) [m/s, rad/s].
 
         Returns:
-            (n, 6) [N s/m, N m s].
+            Drag divided by speed, (n, 6) [N s/m, N m s].
         """
         return np.asarray(numbers["linear"] + numbers["quadratic"] * speeds)
 
@@ -139,7 +140,7 @@ class Drag(Term):
 
 
 def _turned(Q: np.ndarray, diagonal: np.ndarray) -> np.ndarray:
-    """The diagonal of Q^T diag Q, for axes that are the same but for their order."""
+    """The diagonal of Q^T diag Q, for axes Q that only differ in their order."""
     return np.einsum(
         "nji,nj->ni", np.broadcast_to(Q, (max(len(Q), len(diagonal)), 3, 3)) ** 2, diagonal + 0.0 * Q[:, 0]
     )
@@ -149,16 +150,16 @@ def _turned(Q: np.ndarray, diagonal: np.ndarray) -> np.ndarray:
 class DragMatrix(Term):
     """Drag by full matrices: force_i = -sum_j (linear_ij + quadratic_ij |v_j|) v_j (Fossen 2021, section 8.1).
 
-    i and j run over forces and torques, velocities and angular velocities, relative to the water and about the user's origin.
+    i runs over forces and torques, and j over velocities and angular velocities, relative to the water and about the user's
+    origin.
 
     Args:
         linear: Linear coefficients, (6, 6) [N s/m, N s, N m s]; 0 by default.
         quadratic: Quadratic coefficients, (6, 6) [N s2/m2, N s2, N m s2]; 0 by default.
 
     Raises:
-        SceneError: If a matrix creates energy: its power nu.D nu is negative at some velocity (for the quadratic matrix,
-            at the minimum that a descent from the worst of 4,000 directions finds). Also if a number is invalid (see
-            `Term`).
+        SceneError: If a matrix creates energy, since its power nu.D nu is negative at some velocity, or a number is invalid
+            (see `Term`). For the quadratic matrix, the test searches by descents from the worst of 4,000 directions.
     """
 
     type: ClassVar[str] = "drag_matrix"
@@ -207,9 +208,9 @@ BESIDE = ~np.eye(6, dtype=bool)
 
 
 def creates_energy(matrices: np.ndarray, quadratic: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Mask of matrices (n, 6, 6) that would speed a vehicle up, and the worst velocity (n, 6) for each.
+    """Mask of drag matrices (n, 6, 6) that would accelerate a vehicle, and the worst velocity (n, 6) for each.
 
-    The test is nu.D nu: for linear matrices by eigenvalues, for quadratic ones by descents from the worst of many directions.
+    The test is nu.D nu < 0, by eigenvalues for linear and by descents from the worst of many directions for quadratic ones.
     """
     bad, worst = np.zeros(len(matrices), bool), np.zeros((len(matrices), 6))
     doubtful = ~(_surely_brakes_quadratically if quadratic else _surely_brakes)(matrices)
@@ -219,7 +220,7 @@ def creates_energy(matrices: np.ndarray, quadratic: bool) -> tuple[np.ndarray, n
 
 
 def _surely_brakes(matrices: np.ndarray) -> np.ndarray:
-    """Mask of matrices (n, 6, 6) with nu.D nu >= 0 by the rows of the symmetric part: each diagonal outweighs its row."""
+    """Mask of matrices (n, 6, 6) with nu.D nu >= 0 because the symmetric part is diagonally dominant."""
     S = np.abs(matrices + np.swapaxes(matrices, 1, 2))
     diagonal = np.einsum("nii->ni", matrices)
     return np.asarray(np.all((diagonal >= 0.0) & (4.0 * diagonal >= S.sum(axis=2)), axis=1))
@@ -228,7 +229,8 @@ def _surely_brakes(matrices: np.ndarray) -> np.ndarray:
 def _surely_brakes_quadratically(matrices: np.ndarray) -> np.ndarray:
     """Mask of matrices (n, 6, 6) with sum_ij D_ij v_i |v_j| v_j >= 0 for every v.
 
-    By |v_i| v_j^2 <= (|v_i|^3 + 2 |v_j|^3)/3, in velocities whose own drag is |v_i|^3. Sufficient only.
+    The test uses |v_i| v_j^2 <= (|v_i|^3 + 2 |v_j|^3)/3, with velocities scaled to the own drag |v_i|^3. It is sufficient,
+    not necessary.
     """
     diagonal = np.einsum("nii->ni", matrices)
     brakes = (diagonal >= 0.0).all(axis=1)
@@ -245,7 +247,7 @@ def _surely_brakes_quadratically(matrices: np.ndarray) -> np.ndarray:
 
 
 def _searched(matrices: np.ndarray, quadratic: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Search like `creates_energy`, for matrices that no inequality decides."""
+    """Result of `creates_energy` by search, for matrices that no inequality decides."""
     if not quadratic:
         limit = -1e-9 * np.abs(matrices).max(axis=(1, 2))
         # Divided by a power of two, which keeps all digits, lest two of the largest numbers add up to none.
@@ -278,7 +280,7 @@ STARTS, DESCENT = 10, 60
 
 
 def _own_scale(matrices: np.ndarray) -> np.ndarray:
-    """Sizes of velocities (n, 6) whose own drag is 1, whatever the units; where an axis has none, as its entries are large."""
+    """Sizes of velocities (n, 6) with own drag 1, in any units; the largest entry replaces a diagonal entry of 0."""
     diagonal = np.abs(np.einsum("nii->ni", matrices))
     most = np.maximum(np.abs(matrices).max(axis=1), np.abs(matrices).max(axis=2))
     size = np.where(diagonal > 0.0, diagonal, most)
@@ -286,7 +288,7 @@ def _own_scale(matrices: np.ndarray) -> np.ndarray:
 
 
 def _descended(matrices: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The least power (n,) of x.D |x| x over unit vectors that descents from x (n, starts, 6) find, and where (n, 6)."""
+    """The least power x.D |x| x (n,) over unit vectors, found by descents from x (n, starts, 6), and its vector (n, 6)."""
 
     def power(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         size = np.abs(x)
@@ -309,7 +311,7 @@ def _descended(matrices: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndar
 
 
 def entry_words(**matrices: np.ndarray) -> tuple[str, ...]:
-    """The entries that are not zero for some member, as words such as "q01"; matrices (n, 6, 6) by their letter."""
+    """The entries that are not zero for some member, as words such as "q01"; matrices (n, 6, 6) are named by a letter."""
     found = {letter: np.argwhere((matrix != 0.0).any(axis=0)) for letter, matrix in matrices.items()}
     return tuple(f"{letter}{i}{j}" for letter, places in found.items() for i, j in places.tolist())
 
@@ -317,8 +319,8 @@ def entry_words(**matrices: np.ndarray) -> tuple[str, ...]:
 def packed_matrix(linear: np.ndarray, quadratic: np.ndarray, context: PackingContext) -> Packed:
     """Device rows of drag matrices (n, 6, 6), user's axes and origin: the linear matrix, then the quadratic one.
 
-    Where the kernel's axes are turned, the quadratic part is given for each velocity that has a column: its twist (6), which
-    measures the velocity, and its wrench (6).
+    If the kernel's axes are rotated, the quadratic part has two entries for each nonzero column: the twist (6), which
+    measures the velocity, and the wrench (6).
     """
     # X gives the user's velocities from those at the origin of the forces in the kernel's axes.
     X = context.frame.from_forces

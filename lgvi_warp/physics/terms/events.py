@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Events: conditions that stop a member. Each has a status of its own, and the run records the time."""
+"""Events: conditions that stop a member. Each has its own status, and the run records the time."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Event(Term):
-    """A condition that stops a member as soon as its distance, positive while the member goes on, is 0 or below.
+    """Base class of events: a condition that stops a member as soon as a distance function is 0 or negative.
 
-    Distances look at the position of the body's origin, in inertial axes.
+    Distances depend on the position of the body's origin, in inertial axes.
 
     Args:
         name: Name of the event in parameters ("name.field"); by default its type.
 
     Attributes:
         device: Name of a module of lgvi_kernels.stops, or any object with `distance(view, p)`.
-        status: Status of a member that it stopped.
+        status: Status of a member that the event stopped.
     """
 
     status: ClassVar[Status] = Status.CONDITION
@@ -37,30 +37,30 @@ class Event(Term):
 
     @property
     def follows(self) -> str:
-        """Key of the part of the controller at which it looks; by default "", none."""
+        """Key of the part of the controller that the event watches; by default "", for none."""
         return ""
 
     def wired(self, bus: Any) -> Any:
-        """Tell the event where it finds what a part of the controller writes.
+        """Give the event the rows of memory of the controller's part that it watches.
 
         Args:
             bus: Rows of the controller's memory; None in a scene without a controller.
 
         Returns:
-            A copy, or the event where it needs nothing; by default the latter.
+            A copy, or the event itself if it watches no part, which is the default.
 
         Raises:
-            SceneError: If there is no such part.
+            SceneError: If the controller has no such part.
         """
         return self
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Surface(Event):
-    """Stop where the body's origin rises to a depth.
+    """Stop a member when the body's origin rises to a depth.
 
     Args:
-        depth: Depth [m]; 0 by default, the surface.
+        depth: Depth at which members stop [m]; 0 by default, the surface.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -77,7 +77,7 @@ class Surface(Event):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Box(Event):
-    """Stop where the body's origin leaves a box.
+    """Stop a member when the body's origin leaves a box.
 
     Args:
         lower: Lower corner, shape (3,) [m], in inertial axes.
@@ -112,7 +112,7 @@ class StopTime(Event):
     """Stop a member at a time.
 
     Args:
-        at: Time [s], from 0.
+        at: Time at which members stop [s], at least 0.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -129,12 +129,12 @@ class StopTime(Event):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Battery(Event):
-    """Stop a member where the energy that it has used reaches the capacity of its battery.
+    """Stop a member when the energy that it has used reaches the capacity of its battery.
 
-    The scene accounts that energy by a term `lw.terms.EnergyUse`.
+    The scene must account the energy used with a term `lw.terms.EnergyUse`.
 
     Args:
-        capacity: Energy that the battery gives [J]: 3.6e6 is 1 kWh.
+        capacity: Energy that the battery can deliver [J]; 3.6e6 is 1 kWh.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -157,16 +157,16 @@ class Battery(Event):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class MissionDone(Event):
-    """Stop a member at the tick at which it reaches the last of its waypoints, and has circled about it as long as asked.
+    """Stop a member at the tick at which it has reached its last waypoint and completed the circles requested there.
 
-    With `at_end = "loiter"` and no turns or time about the last point, the mission is done as the circle begins. A mission
-    that is done at the last tick of a run ends it as "ok".
+    With `at_end = "loiter"` and no turns or time at the last point, the mission is done when the circle begins. If the
+    mission is done at the last tick of a run, the member ends as "ok".
 
     Args:
-        guidance: Name of the guidance `lw.control.Waypoints`; "waypoints" by default. Its `at_end` is not "go_on".
+        guidance: Name of the guidance `lw.control.Waypoints`; "waypoints" by default. Its `at_end` must not be "go_on".
 
     Raises:
-        SceneError: When a scene is built that has no such guidance; or a number is invalid (see `Term`).
+        SceneError: If a number is invalid (see `Term`). A scene refuses the event if it has no such guidance.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -212,10 +212,10 @@ class MissionDone(Event):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Outside(Event):
-    """Stop where the body's origin leaves the grid of a `current_field`, or sinks below its last level.
+    """Stop a member when the body's origin leaves the grid of a `current_field`, or sinks below its last level.
 
-    A field with `outside = "stop"` adds this event itself; no other field can have it. Along an axis of one node, and above
-    the first level, nothing stops.
+    A field with `outside = "stop"` adds this event itself; no other field can have it. Members do not stop along an axis of
+    one node, or above the first level.
 
     Args:
         field: Name of the field; "current_field" by default.

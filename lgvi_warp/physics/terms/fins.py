@@ -30,19 +30,20 @@ PARALLEL = 1e-6
 class Fins(Term):
     """n fixed fins with lift rho A/2 lift_slope sin(a) cos(a) V^2 and drag rho A/2 (drag + drag_normal sin^2 a) V^2.
 
-    V and a are speed and angle of the flow in the plane of chord and normal. One number stands for n equal ones.
+    V and a are the speed and angle of attack of the flow in the plane of chord and normal. A single number stands for n equal
+    numbers.
 
     Args:
-        position: Where each fin's force acts, (n, 3) [m] from the body's origin.
+        position: Point at which each fin's force acts, (n, 3) [m] from the body's origin.
         chord: Direction from trailing to leading edge, (n, 3), of any length but 0.
-        normal: Direction of lift, (n, 3), of any length but 0; it is made orthogonal to the chord.
+        normal: Direction of lift, (n, 3), of any length but 0; its component along the chord is removed.
         area: Area A, (n,) [m2].
         lift_slope: Slope of the lift coefficient, (n,) [1/rad].
         drag: Drag coefficient along the flow, (n,).
         drag_normal: Drag coefficient that grows with sin^2 a, (n,); 0 by default.
 
     Raises:
-        SceneError: If chord and normal span no plane; or a number is invalid (see `Term`).
+        SceneError: If chord and normal are parallel, or a number is invalid (see `Term`).
     """
 
     type: ClassVar[str] = "fins"
@@ -102,13 +103,13 @@ class Fins(Term):
 
 
 def _degenerate(chord: np.ndarray, normal: np.ndarray) -> Any:
-    """Whether (..., 3) normals have no direction apart from their chords."""
+    """Mask (...) of normals (..., 3) that are parallel to their chords."""
     size = np.linalg.norm(chord, axis=-1) * np.linalg.norm(normal, axis=-1)
     return np.linalg.norm(np.cross(chord, normal), axis=-1) <= PARALLEL * size
 
 
 def unit_directions(numbers: Numbers) -> tuple[np.ndarray, np.ndarray]:
-    """Chords and normals (members, fins, 3) of length 1, the normals orthogonal to the chords."""
+    """Chords and normals (members, fins, 3) of length 1; the normals are orthogonal to the chords."""
     chord = numbers["chord"] / np.linalg.norm(numbers["chord"], axis=-1, keepdims=True)
     normal = numbers["normal"] - np.sum(numbers["normal"] * chord, axis=-1, keepdims=True) * chord
     return chord, normal / np.linalg.norm(normal, axis=-1, keepdims=True)
@@ -117,8 +118,8 @@ def unit_directions(numbers: Numbers) -> tuple[np.ndarray, np.ndarray]:
 def fin_rows(numbers: Numbers, context: PackingContext, matrices: bool = True) -> np.ndarray:
     """Device rows (members, fins, 51) of fins: their twists c and n, rho A/2 times the three coefficients, and S and W.
 
-    S = c c^T + n n^T and W = n c^T - c n^T, block by block (lgvi_kernels/laws/fins.py). matrices: whether S and W are among
-    them, which forces need where the flow has an angle.
+    S = c c^T + n n^T and W = n c^T - c n^T, block by block (lgvi_kernels/laws/fins.py). matrices: Whether to include S and W,
+    which are needed if the angle of the flow counts.
     """
     chord, normal = unit_directions(numbers)
     half = 0.5 * context.parameters["environment.water_density"][:, None] * numbers["area"]
@@ -139,12 +140,12 @@ def fin_rows(numbers: Numbers, context: PackingContext, matrices: bool = True) -
 
 
 def _twist(point: np.ndarray, direction: np.ndarray) -> np.ndarray:
-    """`twist` in the user's axes and about his origin."""
+    """`twist` in the user's axes and about the user's origin."""
     point, direction = np.broadcast_arrays(point, direction)
     return np.concatenate([direction, np.cross(point, direction)], axis=-1)
 
 
 def twist(frame: Frame, point: np.ndarray, direction: np.ndarray) -> np.ndarray:
-    """Rows that measure the velocity of a point (n, ..., 3) [m] along a unit vector: also the wrench of a unit force there."""
+    """Rows that give the velocity of a point (n, ..., 3) [m] along a unit vector, and the wrench of a unit force there."""
     *_, point, direction = repeated(frame.Q, frame.forces, point, direction)
     return np.concatenate([frame.vector(direction), frame.torque(np.cross(point, direction), direction)], axis=-1)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The sea floor, flat or on a grid: where it stops members, and how deep it is."""
+"""The sea floor, flat or on a grid: an event that stops members, and its depth."""
 
 from __future__ import annotations
 
@@ -26,28 +26,28 @@ FAR_BELOW = 1e6
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Floor(InFile, Event):
-    """Stop where the body's origin sinks to the sea floor: flat, or on a regular grid, where its depth is bilinear.
+    """Stop a member when the body's origin sinks to the sea floor, which is flat or on a regular grid.
 
-    Between the nodes of a grid the depth is linear in north and in east; outside, the nearest edge holds. `edges` gives the
-    event that stops members there.
+    Between the nodes of a grid the depth is bilinear in north and east. Outside the grid, the depth of the nearest edge is
+    used. `edges` returns an event that stops members at the edges.
 
     Args:
         depth: Depth of the floor [m]; or a grid of depths, (x, y) [m], at the nodes along north and east.
-        origin: Place of the grid's first node, (2,) [m]: north and east; zeros by default.
-        spacing: Distance of the nodes along north and east, (2,) [m]; needed with a grid.
-        clearance: Height above the floor at which members stop [m]; 0 if omitted. Set it if it varies by member.
-        contact: "stop", the default, or "rest": members land there by a term `lw.terms.BottomContact`.
+        origin: Position of the grid's first node, (2,) [m]: north and east; zeros by default.
+        spacing: Distance between nodes along north and east, (2,) [m]; required with a grid.
+        clearance: Height above the floor at which members stop [m]; 0 if omitted. Give a value if it varies by member.
+        contact: "stop", the default; or "rest", so that members land on the floor by a term `lw.terms.BottomContact`.
 
     Methods:
-        from_file: Floor of a chart, in a raster or a data set.
-        depth_at: Depth of the floor at a place.
-        edges: The event that stops members which leave the grid.
+        from_file: Floor from a chart, in a raster or a data set.
+        depth_at: Depth of the floor at given points.
+        edges: The event that stops members that leave the grid.
 
     Raises:
-        SceneError: If a grid has no spacing, or a flat floor has one; or a number is invalid (see `Term`).
+        SceneError: If a grid has no spacing, a flat floor has a spacing, or a number is invalid (see `Term`).
 
     Examples:
-        A slope that falls by 5 m on each 100 m to the north.
+        A slope that deepens by 5 m per 100 m to the north.
 
         >>> import lgvi_warp as lw
         >>> lw.Scene.named("remus_100", events=[lw.events.Floor(depth=40.0)]).parameters()["floor.depth"]
@@ -86,27 +86,28 @@ class Floor(InFile, Event):
         contact: str = STOP,
         name: str = "",
     ) -> Self:
-        """Read a floor on a grid from a file: NetCDF in the CF conventions, such as GEBCO's, or a GeoTIFF.
+        """Read a floor on a grid from a file: NetCDF in the CF conventions, such as that of GEBCO, or a GeoTIFF.
 
         Args:
             file: Path of the file, or an xarray Dataset.
             origin: Latitude and longitude [deg] of the origin of the inertial axes, (2,).
-            region: Least and largest north and east that are read, (2, 2) [m]; by default all that is in the file.
-            spacing: Distances of the nodes that are made along north and east, (2,) [m]; by default as fine as the file's.
-            variable: Name of the variable; by default the one that is a depth of the floor or an elevation.
-            positive: "up" where the numbers are elevations, "down" where they are depths; by default what the variable says,
-                and "up" of a GeoTIFF.
-            fill: What stands where depths are missing: "refuse", the default, nothing; "nearest"; or "zero", land.
-            attributes: Attributes that a NetCDF file lacks or has wrong, for instance {"z.grid_mapping": "EPSG:3996"}.
+            region: Least and largest north and east to read, (2, 2) [m]; by default the whole file.
+            spacing: Distances between the nodes of the regular grid along north and east, (2,) [m]; by default as fine as the
+                file.
+            variable: Name of the variable; by default the variable that is a floor depth or an elevation.
+            positive: "up" if the numbers are elevations, "down" if they are depths; by default the direction that the
+                variable states, and "up" for a GeoTIFF.
+            fill: Treatment of missing depths: "refuse", the default; "nearest"; or "zero", for land at the surface.
+            attributes: Missing or wrong attributes of a NetCDF file, for instance {"z.grid_mapping": "EPSG:3996"}.
             clearance: Height above the floor at which members stop [m]; 0 if omitted.
-            contact: "stop", the default, or "rest", as of the class.
+            contact: "stop", the default, or "rest", as in the class.
             name: As in `Event`.
 
         Returns:
-            The floor, which holds the depths: nothing looks at the file again.
+            The floor. It holds the depths, so the file is not read again.
 
         Raises:
-            SceneError: If the file cannot be read, has no floor, or does not cover the region; with the remedy.
+            SceneError: If the file cannot be read, has no floor, or does not cover the region; the message names the remedy.
             MissingExtra: If xarray, rasterio or pyproj is not installed.
 
         Examples:
@@ -141,7 +142,7 @@ class Floor(InFile, Event):
 
     @functools.cached_property
     def on_grid(self) -> bool:
-        """Whether the depth is that of a grid."""
+        """Whether the floor is on a grid."""
         return np.ndim(np.asarray(self.depth, dtype=object)) > 0
 
     def shape_of(self, item: Field[Any]) -> tuple[Any, ...]:
@@ -174,14 +175,14 @@ class Floor(InFile, Event):
         return self.packed_grid(numbers, {"clearance": clearance})
 
     def packed_grid(self, numbers: Numbers, others: Mapping[str, Any]) -> Packed:
-        """Pack the floor for device code that looks its depth up; a flat one is a grid of one node.
+        """Pack the floor for device code that looks up its depth; a flat floor is a grid of one node.
 
         Args:
             numbers: The floor's numbers by field, each of shape (n, ...).
-            others: More fields of the device struct.
+            others: Further fields of the device struct.
 
         Returns:
-            The fields that `lgvi_kernels.cells` reads, with the others, and the rows of depths.
+            The fields that `lgvi_kernels.cells` reads, the fields `others`, and the rows of depths.
         """
         depth, origin, inverse = self._grid(numbers)
         counts = depth.shape[1:]
@@ -194,7 +195,7 @@ class Floor(InFile, Event):
         return Packed(values, depth.reshape(len(depth), -1))
 
     def _grid(self, numbers: Numbers) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Depths (n, x, y) [m], place of the first node (n, 2) [m], 1 / spacing (n, 2) [1/m]."""
+        """Depths (n, x, y) [m], position of the first node (n, 2) [m], 1 / spacing (n, 2) [1/m]."""
         if self.on_grid:
             return numbers["depth"], numbers["origin"], 1.0 / numbers["spacing"]
         return numbers["depth"][:, None, None], np.zeros((1, 2)), np.ones((1, 2))
@@ -202,16 +203,16 @@ class Floor(InFile, Event):
     def depth_at(
         self, north: np.ndarray | float, east: np.ndarray | float, numbers: Numbers | None = None
     ) -> np.ndarray:
-        """The depth of the floor at places.
+        """The depth of the floor at given points.
 
         Args:
-            north: North of the places [m], of any shape.
-            east: East of them [m], of the same shape.
-            numbers: The floor's numbers by field, each of shape (1 or n, ...), where the last dimension of the places is n
-                members; None, the default, for the floor's own.
+            north: North coordinates of the points [m], of any shape.
+            east: East coordinates of the points [m], of the same shape.
+            numbers: The floor's numbers by field for n members, each of shape (1 or n, ...); the last dimension of the points
+                is then n. None, the default, for the floor's own numbers.
 
         Returns:
-            Depths [m], of the shape of the places.
+            Depths [m], of the shape of the points.
 
         Examples:
             >>> import lgvi_warp as lw
@@ -223,7 +224,7 @@ class Floor(InFile, Event):
         return self._looked_up(north, east, numbers)[0]
 
     def height(self, position: np.ndarray, velocity: np.ndarray, numbers: Numbers) -> tuple[np.ndarray, np.ndarray]:
-        """Height above where members stop, and its rate.
+        """Height above the level at which members stop, and its rate.
 
         Args:
             position: Positions (..., n, 3) [m], inertial axes.
@@ -239,7 +240,7 @@ class Floor(InFile, Event):
         return depth - numbers.get("clearance", np.zeros(1)) - z, rate
 
     def _looked_up(self, north: Any, east: Any, numbers: Numbers) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Depths at places, and their slopes to the north and to the east, 0 outside."""
+        """Depths at points, and their slopes to the north and to the east; the slopes are 0 outside the grid."""
         depth, origin, inverse = self._grid(numbers)
         places = np.broadcast_arrays(np.asarray(north, float), np.asarray(east, float))
         shape, corner, part, steep = places[0].shape, [], [], []
@@ -262,7 +263,7 @@ class Floor(InFile, Event):
         return found[0], found[1], found[2]
 
     def edges(self, name: str = "edge of the chart") -> Box:
-        """The event that stops members which leave the grid.
+        """The event that stops members that leave the grid.
 
         Args:
             name: Name of the event; "edge of the chart" by default.
@@ -271,7 +272,7 @@ class Floor(InFile, Event):
             A box with the corners of the grid, from far above the sea to far below it.
 
         Raises:
-            SceneError: If the floor is flat, and has no edges.
+            SceneError: If the floor is flat, since it then has no edges.
 
         Examples:
             >>> import lgvi_warp as lw
@@ -292,7 +293,7 @@ class Floor(InFile, Event):
 def altitude_over(events: Sequence[Any], position: np.ndarray, parameters: Numbers) -> np.ndarray:
     """Height (k, n) [m] of positions (k, n, 3) above the highest floor among the events of a scene.
 
-    parameters: all numbers of the scene by name, each (1 or n, ...). Raises SceneError where there is no floor.
+    parameters: All numbers of the scene by name, each (1 or n, ...). Raises SceneError if there is no floor.
     """
     floors = [event for event in events if isinstance(event, Floor)]
     if not floors:

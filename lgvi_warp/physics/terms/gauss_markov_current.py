@@ -26,10 +26,10 @@ class GaussMarkovCurrent(NoisyTerm):
     Args:
         standard_deviation: Standard deviation of u in the long run, (3,) [m/s], in inertial axes.
         time_constant: Correlation time [s], above 0.
-        start: "zero", the default: u = 0 at t = 0; or "stationary": u is drawn with the standard deviation.
+        start: "zero", the default, for u = 0 at t = 0; or "stationary", to draw u at t = 0 with the standard deviation.
 
     Raises:
-        SceneError: If the time constant is not above 0; or a number is invalid (see `Term`).
+        SceneError: If the time constant is not above 0, or a number is invalid (see `Term`).
     """
 
     type: ClassVar[str] = "gauss_markov_current"
@@ -66,7 +66,7 @@ class GaussMarkovCurrent(NoisyTerm):
         return np.broadcast_to(self._first(numbers, context), position.shape)
 
     def _first(self, numbers: Numbers, context: PackingContext) -> np.ndarray:
-        """u at t = 0, (1 or n, 3) [m/s], drawn by seed, member and the term's name, as every number that varies by member."""
+        """u at t = 0, (1 or n, 3) [m/s], drawn from the seed, the member and the term's name."""
         if self.start == "zero":
             return np.zeros((1, 3))
         if context.given is not None:

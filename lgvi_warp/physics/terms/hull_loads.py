@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Loads of water that varies along a slender hull, by strips."""
+"""Loads on a slender hull due to water motion that varies along it, by strips."""
 
 from __future__ import annotations
 
@@ -14,21 +14,22 @@ from lgvi_warp.physics.terms.strips import GAUSS, StripTerm, across
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class HullLoads(StripTerm):
-    """Loads on a slender hull in water that varies along it, as waves do, by strips (Lighthill 1960; Newman 1977, 7.4).
+    """Loads on a slender hull in water that moves differently along it, as in waves (Lighthill 1960; Newman 1977, 7.4).
 
-    The vehicle's added mass and the water at its origin give the loads in water that is uniform along the hull. This term
-    adds the differences at each station: the pressure of the undisturbed water, the momentum of the water that the strip
-    sets in motion, and cross-flow drag at the flow there. It replaces `CrossFlow`: use one of them.
+    The loads are computed by strips. The vehicle's added mass and the water velocity at its origin give the loads in water
+    that is uniform along the hull. This term adds the differences at each station: the pressure of the undisturbed water,
+    the momentum of the water that the strip sets in motion, and cross-flow drag with the local flow. The term includes the
+    drag of `CrossFlow`: use only one of the two.
 
     Args:
-        stations: Places along the body's x axis, (k,) [m], rising; two or more, from stern to bow.
+        stations: Positions along the body's x axis, (k,) [m], rising; two or more, from stern to bow.
         diameters: Breadth D of the hull across the flow, (k,) [m], linear between stations.
         added_mass: Added mass across the hull per length, (k,) [kg/m], linear between stations; by default that of a
             slender round hull, rho pi D^2 / 4.
         drag_coefficient: Drag coefficient Cd, (k,), or one number for all stations; 0 by default.
 
     Raises:
-        SceneError: If stations do not rise or are fewer than two; or a number is invalid (see `Term`).
+        SceneError: If stations do not rise or are fewer than two, or a number is invalid (see `Term`).
 
     Examples:
         >>> import lgvi_warp as lw

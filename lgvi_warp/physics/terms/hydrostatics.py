@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Weight, buoyancy and restoring moment. They follow from the vehicle, so that no scene needs to list them."""
+"""Weight, buoyancy and restoring moment. They follow from the vehicle, so no scene lists them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from lgvi_warp.physics.terms.base import CONSERVED, Array, Numbers, Packed, Pack
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Weight(Term):
-    """Weight less buoyancy, along the vertical (section IV of Nordkvist & Sanyal 2010). It takes no numbers."""
+    """Weight minus buoyancy, along the vertical (section IV of Nordkvist & Sanyal 2010). The term has no numbers."""
 
     type: ClassVar[str] = "weight"
 
@@ -34,7 +34,7 @@ class Weight(Term):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Restoring(Term):
-    """Moment of buoyancy and weight about the body's origin (section IV of Nordkvist & Sanyal 2010). It takes no numbers."""
+    """Moment of buoyancy and weight about the body's origin (section IV of Nordkvist & Sanyal 2010). It has no numbers."""
 
     type: ClassVar[str] = "restoring"
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Terms and events whose numbers a file may hold, which an extension reads."""
+"""Terms and events whose numbers can come from a file, which an extension reads."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from lgvi_warp.common.errors import Faults, SceneError
 
 @explained
 class InFile:
-    """A term or an event that is also made of a file. The extension's words are its type."""
+    """Base class of terms and events that can be read from a file. Their `type` selects the extension's reader."""
 
     type: ClassVar[str]
     # Keys of a table with the key `file`, in a scene file, beside those of `of_file`; the method that reads the file.
@@ -22,7 +22,7 @@ class InFile:
 
     @classmethod
     def of_file(cls) -> Any:
-        """Return the class whose fields a table with the key `file` may have; None without the extension that reads it."""
+        """Return the class that defines the keys of a table with a `file`; None if no extension reads such a file."""
         return _held("requests", cls.type)
 
     @classmethod
@@ -30,14 +30,14 @@ class InFile:
         """Read the file that a table of a scene file names.
 
         Args:
-            where: The table's place in the scene.
-            table: The key `file`, and those of the method besides that reads it.
+            where: Name of the table in the scene.
+            table: The key `file`, and keys for the arguments of the method that reads the file.
 
         Returns:
             The term or event.
 
         Raises:
-            SceneError: As that method.
+            SceneError: If a key is unknown or missing, or the method that reads the file raises this error.
         """
         fields = dataclasses.fields(_known(cls.of_file()))
         values = {key: value for key, value in table.items() if key != "type"}
@@ -56,20 +56,20 @@ class InFile:
 
 
 def numbers_in(source: Any, kind: type[InFile], wanted: Mapping[str, Any], **others: Any) -> Any:
-    """Read the numbers of a file or of a data set, as they are wanted, by the extension that has a reader."""
+    """Read the requested numbers of a file or of a data set, by the extension that has a reader."""
     request = _known(kind.of_file())(**wanted)
     return _held("readers", kind.type)(source, request, **others)
 
 
 def _held(table: str, word: str) -> Any:
-    """Return what an extension has under a word; None where none has it."""
+    """Return the entry for a word in a table of the extensions; None if no extension has it."""
     from lgvi_warp.common import extensions  # a scene without a file does not load it
 
     return extensions.load(table, word)
 
 
 def _known(request: Any) -> Any:
-    """Refuse a file that no installed extension reads."""
+    """Return the request, or refuse a file that no installed extension reads."""
     if request is None:
         raise SceneError(["file: no installed extension reads such a file. Install lgvi-warp anew."])
     return request

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Lift of a hull in proportion to its speed ahead."""
+"""Lift of a hull that is proportional to its forward speed."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from lgvi_warp.physics.terms.drag import entry_words
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class BodyLift(Term):
-    """Lift of a hull in proportion to its speed ahead: force_i = -u sum_j matrix_ij v_j, u the speed along the body's x axis.
+    """Lift of a hull proportional to its forward speed u, along the body's x axis: force_i = -u sum_j matrix_ij v_j.
 
-    i and j run over forces and torques, velocities and angular velocities. Any matrix is allowed: an empirical law may speed
-    the vehicle up.
+    i runs over forces and torques, and j over velocities and angular velocities. Any matrix is allowed, even if this
+    empirical law then accelerates the vehicle.
 
     Args:
         matrix: Coefficients, (6, 6) [kg/m, kg, kg m]: minus Prestero's (2001) Y_uv, Z_uw, M_uw, N_uv and so on.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The base class of terms that draw random numbers, once a step or on a grid of their own."""
+"""The base class of terms that draw random numbers, once a step or at fixed times."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ if TYPE_CHECKING:
 
 
 def channel(key: str) -> int:
-    """The first of a term's two channels of random numbers: twice a hash of its name (two names share one by 2^-31)."""
+    """First of a term's two channels of random numbers: twice a hash of its name. Two names collide with probability 2^-31."""
     return _signed(2 * zlib.crc32(key.encode()))
 
 
 def key_of(name: str, context: PackingContext) -> dict[str, Any]:
-    """Keys of random numbers, besides the number of the draw: the low 64 bits of the seed, the member, who draws."""
+    """Keys of random numbers, except for the number of the draw: low 64 bits of the seed, member, and channel of the name."""
     return {"member": context.members.astype(np.int32), **words_of(context.seed, name)}
 
 
@@ -34,7 +34,7 @@ def words_of(seed: int, name: str) -> dict[str, int]:
 
 
 def normals_at_start(seed: int, name: str, members: np.ndarray) -> np.ndarray:
-    """Three standard normals (n, 3) of each of some members (n,) for where a term of this name starts, drawn by the host."""
+    """Three standard normal numbers (n, 3) for each of some members (n,), drawn by the host for a term's initial state."""
     from scipy.special import ndtri
 
     return np.asarray(ndtri(uniforms_of(seed, f"{name}.start", members, 3)))
@@ -47,20 +47,21 @@ def _signed(word: int) -> int:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class NoisyTerm(Term):
-    """A term that draws random numbers, which follow from the seed, the member, the term's name and the number of the draw.
+    """Base class of terms with random numbers, which follow from seed, member, the term's name and the number of the draw.
 
-    The device struct has their `key`, of which the device code asks `normals_over(view, p.key, stream)` for the numbers of a
-    step; it sets NOISE = True.
+    The device struct has a field `key`. The device code sets NOISE = True and gets the numbers of a step by
+    `normals_over(view, p.key, stream)`.
 
     Args:
-        noise_step: Time from one draw to the next [s]: runs whose steps are whole multiples of it see the same path, and no
-            other step is allowed. None, the default, draws once a step: runs with different steps see different paths.
+        noise_step: Time from one draw to the next [s]. Runs whose steps are whole multiples of it have the same noise path; no
+            other step is allowed. None, the default, draws once a step, so that runs with different steps have different
+            paths.
 
     Methods:
         draws: Number of draws in one step of a run.
 
     Raises:
-        SceneError: If `noise_step` is not above 0; or a number is invalid (see `Term`).
+        SceneError: If `noise_step` is not above 0, or a number is invalid (see `Term`).
     """
 
     timed: ClassVar[bool] = True
@@ -74,18 +75,18 @@ class NoisyTerm(Term):
             h: Step of the run [s].
 
         Returns:
-            1 without a `noise_step`; else the whole number that is nearest to h / noise_step, at least 1.
+            1 without a `noise_step`; else the whole number nearest to h / noise_step, at least 1.
         """
         return 1 if self.noise_step is None else max(1, round(h / self.noise_step))
 
     def streams(self, acting: Collection[str]) -> tuple[Stream, ...]:
-        """Streams of its draws: by default two of three numbers each, where it acts.
+        """Streams of the term's draws: by default two streams of three numbers each, if the term acts.
 
         Args:
-            acting: Names of its numbers that vary, or are not zero.
+            acting: Names of the term's numbers that vary or are not zero.
 
         Returns:
-            The streams, by the names that `NoiseDraws` shows.
+            The streams, with the names that `NoiseDraws` shows.
         """
         from lgvi_warp.physics.given_draws import Stream
 

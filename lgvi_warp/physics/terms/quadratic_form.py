@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Forces that are sums of products of two velocities, by the names of their coefficients."""
+"""Forces that are sums of products of two velocities, with named coefficients."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _REMEDY = "write X_vr, Y_v|r| or Y_|v|r, with X Y Z K M N and u v w p q r; |vw| 
 
 
 class Product(NamedTuple):
-    """A product in force i of a factor and v_k; its kind: "c", v_j; "d", |v_j|; "h", (v^2 + w^2)^1/2, where j is 1."""
+    """A product in force i of a factor and v_k. kind of the factor: "c" v_j, "d" |v_j|, "h" (v^2 + w^2)^1/2 with j = 1."""
 
     kind: str
     i: int
@@ -33,14 +33,14 @@ class Product(NamedTuple):
 
     @property
     def name(self) -> str:
-        """Name in the usual spelling: X_vr, Y_|v|r, Y_|vw|v."""
+        """Name of the coefficient in the usual spelling: X_vr, Y_|v|r, Y_|vw|v."""
         factor = "vw" if self.kind == "h" else VELOCITIES[self.j]
         factor = factor if self.kind == "c" else f"|{factor}|"
         return f"{FORCES[self.i]}_{factor}{VELOCITIES[self.k]}"
 
 
 def read_product(name: Any) -> Product | None:
-    """The product that a coefficient's name says; None for another name."""
+    """The product of a coefficient's name; None for any other name."""
     match = _NAME.match(re.sub(r"[\s_{}\\$,()]", "", str(name)))
     if match is None:
         return None
@@ -54,7 +54,7 @@ def read_product(name: Any) -> Product | None:
 
 
 def _read_products(faults: Faults, key: str, value: Any) -> None:
-    """Note the names that are none, and products that are given twice."""
+    """Add faults for invalid names and for products that are given twice."""
     try:
         names = names_of(key, value)
     except SceneError as error:
@@ -71,30 +71,30 @@ def _read_products(faults: Faults, key: str, value: Any) -> None:
 
 
 def _ordered(product: Product) -> Product:
-    """The same product, whose factors may come in any order."""
+    """The same product with its factors in a fixed order, to compare products."""
     return product._replace(j=min(product[2:]), k=max(product[2:])) if product.kind == "c" else product
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class QuadraticForm(Term):
-    """A sum of products of two velocities: force_i = sum_jk (c_ijk v_j + d_ijk |v_j|) v_k, by the names of the coefficients.
+    """A sum of products of two velocities: force_i = sum_jk (c_ijk v_j + d_ijk |v_j|) v_k, with named coefficients.
 
-    i, j and k run over forces and torques, velocities and angular velocities, through the water and about the user's origin.
-    Signs are those of the printed coefficients: a drag is negative. Any values are allowed, so that the law may speed the
-    vehicle up.
+    i runs over forces and torques, and j and k over velocities and angular velocities, relative to the water and about the
+    user's origin. Signs are those of published coefficients: a drag coefficient is negative. Any values are allowed, even if
+    the law then accelerates the vehicle.
 
     Args:
-        products: Names of the coefficients, (k,): "X_vr" of v r, "Y_v|r|" of v |r|, "Y_|v|r" of |v| r, and "Z_w|vw|" of
+        products: Names of the coefficients, (k,): "X_vr" for v r, "Y_v|r|" for v |r|, "Y_|v|r" for |v| r, and "Z_w|vw|" for
             w (v^2 + w^2)^1/2.
-        values: The coefficients, (k,) [kg/m, kg, kg m]: of two velocities, of a velocity and a rate, of two rates; of torques
-            [kg, kg m, kg m2].
+        values: The coefficients, (k,), in [kg/m, kg, kg m] for the product of two velocities, of a velocity and a rate, and
+            of two rates; for torques in [kg, kg m, kg m2].
 
     Methods:
-        of: Form of coefficients by name.
-        gertler_hagen: Form of the coefficients of a submarine's standard equations.
+        of: Term from coefficients by name.
+        gertler_hagen: Term from the coefficients of the standard equations of submarines.
 
     Raises:
-        SceneError: If a name is not known or given twice; or a number is invalid (see `Term`).
+        SceneError: If a name is unknown or given twice, or a number is invalid (see `Term`).
 
     Examples:
         >>> import lgvi_warp as lw
@@ -124,7 +124,7 @@ class QuadraticForm(Term):
 
     @classmethod
     def of(cls, coefficients: Mapping[str, float], *, name: str = "") -> QuadraticForm:
-        """A form from coefficients by name.
+        """Build the term from coefficients by name.
 
         Args:
             coefficients: Values by the names of `products`, in the units of `values`.
@@ -155,20 +155,21 @@ class QuadraticForm(Term):
         ignore: Iterable[str] = (),
         name: str = "",
     ) -> QuadraticForm:
-        """A form from the dimensionless coefficients of the standard equations of submarines.
+        """Build the term from the dimensionless coefficients of the standard equations of submarines.
 
-        The names are those of Gertler and Hagen (1967) and Feldman (1979), with or without a prime: "X'uu", "Xvr'", "Z'w" of
-        u w, "Z'*" of u^2, "M'|w|" of u |w|. Of their cross-flow products v|v|, w|w|, |v|r and |w|q have the speed
-        (v^2 + w^2)^1/2, as printed; v|r|, w|q| and ww are taken as v |r|, w |q| and w^2, which they are where the vehicle
-        moves in one plane.
+        The names are those of Gertler and Hagen (1967) and Feldman (1979), with or without a prime: "X'uu", "Xvr'", "Z'w" for
+        u w, "Z'*" for u^2, "M'|w|" for u |w|. The cross-flow products v|v|, w|w|, |v|r and |w|q use the speed
+        (v^2 + w^2)^1/2, as published. The products v|r|, w|q| and ww are read as v |r|, w |q| and w^2, which is exact for a
+        motion in one plane.
 
         Args:
-            coefficients: Dimensionless values by name: forces over rho U^2 L^2 / 2, moments over rho U^2 L^3 / 2, rates times
-                L / U.
+            coefficients: Dimensionless values by name: forces divided by rho U^2 L^2 / 2, moments by rho U^2 L^3 / 2, and
+                rates multiplied by L / U.
             rho: Density of the water [kg/m3].
-            length: The length L that they are made dimensionless with [m].
-            added_mass: The vehicle's added mass, (6, 6) [kg, kg m, kg m2]. Printed coefficients contain what it makes (X'wq,
-                Y'wp, ...), which the vehicle has by itself: given, this is taken off. By default nothing is.
+            length: Reference length L of the dimensionless coefficients [m].
+            added_mass: The vehicle's added mass, (6, 6) [kg, kg m, kg m2]. Published coefficients include its effect (X'wq,
+                Y'wp, ...), which the vehicle's equations already contain. If given, this effect is subtracted. By default
+                nothing is subtracted.
             ignore: Names to leave out; by default none.
             name: Name of the term; by default its type.
 
@@ -176,7 +177,8 @@ class QuadraticForm(Term):
             The term.
 
         Raises:
-            SceneError: If a name is not known, is that of an added mass or of a fin, or given twice; all faults at once.
+            SceneError: If a name is unknown, belongs to an added mass or a fin, or is given twice; the message lists every
+                fault.
 
         Examples:
             >>> import lgvi_warp as lw
@@ -218,7 +220,7 @@ class QuadraticForm(Term):
 
     @property
     def _words(self) -> tuple[str, ...]:
-        """For each product a word of the device code: kind, indices, and place of its value."""
+        """A word of the device code for each product: kind, indices, and index of its value."""
         return tuple(f"{p.kind}{p.i}{p.j}{p.k}at{row}" for row, p in enumerate(self.forms))
 
     def device_in(self, aligned: bool) -> str:
@@ -245,9 +247,10 @@ class QuadraticForm(Term):
 
 
 def drives(forms: Iterable[Product]) -> dict[str, list[int]]:
-    """Places of the products that push along the motion itself where their sum is above 0, by what their sum multiplies.
+    """{text: indices} of products that accelerate the vehicle along its own motion if the sum of their values is above 0.
 
-    Of u ahead, u^2; of another velocity, by itself v|v|, and beside u, u v. A sign of these is that of a drag or of damping.
+    For the forward velocity u the product is u^2; for another velocity v it is v|v|, or u v. Drag and damping have
+    negative values here.
     """
     places: dict[str, list[int]] = {}
     for place, (kind, i, j, k) in enumerate(forms):
@@ -297,7 +300,7 @@ def _standard_product(faults: Faults, key: Any, value: Any) -> Product | None:
 
 
 def _of_added_mass(A: np.ndarray | None) -> Iterable[tuple[Product, float]]:
-    """The products of Kirchhoff's equations, with their values: what the added mass A (6, 6) makes of steady velocities."""
+    """The products of Kirchhoff's equations with their values: the wrench due to added mass A (6, 6) at steady velocities."""
     if A is None:
         return
 

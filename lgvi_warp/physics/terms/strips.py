@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Common parts of terms that cut a slender hull into strips."""
+"""Common parts of terms that divide a slender hull into strips."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ ACROSS = (np.array([[0.0, 1.0, 0.0]]), np.array([[0.0, 0.0, 1.0]]))
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class StripTerm(Term):
-    """A hull along the body's x axis, which is linear between stations, with cross-flow drag at each strip.
+    """Base class of a hull along the body's x axis, linear between stations, with cross-flow drag at each strip.
 
-    A class of it declares `drag_coefficient`.
+    A subclass declares `drag_coefficient`.
 
     Args:
-        stations: Places along the body's x axis, (k,) [m], rising; two or more, from stern to bow.
+        stations: Positions along the body's x axis, (k,) [m], rising; two or more, from stern to bow.
         diameters: Breadth D of the hull across the flow, (k,) [m].
     """
 
@@ -57,6 +57,6 @@ class StripTerm(Term):
 
 
 def across(context: PackingContext) -> dict[str, np.ndarray]:
-    """The two directions across the hull, and what they turn about the method's origin, for the device."""
+    """The two directions across the hull, and the moments of unit forces along them about the method's origin."""
     a, b = (twist(context.frame, np.zeros((1, 3)), direction) for direction in ACROSS)
     return {"a": a[:, :3], "a_arm": a[:, 3:], "b": b[:, :3], "b_arm": b[:, 3:]}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Height of the surface over time, and the terms, events and sensors that look at the depth below it."""
+"""Height of the surface over time, for terms, events and sensors that depend on the depth below it."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from lgvi_warp.physics.terms.base import Array, Numbers, Packed, Term, own
 
 
 class SurfaceLevel(Term):
-    """A height of the surface that changes with time. Abstract.
+    """Base class of terms with a height of the surface that changes with time. Abstract.
 
     Methods:
         height: Height of the surface above the depth 0.
-        mean_height: Its mean over time.
-        highest: The largest height that it reaches.
-        level_rows: Rows of the table for device code that looks at it (lgvi_kernels/tide.py).
+        mean_height: Mean of the height over time.
+        highest: Largest height that the surface can reach.
+        level_rows: Rows of the table for device code that reads the height (lgvi_kernels/tide.py).
     """
 
     unique: ClassVar[bool] = True
@@ -38,7 +38,7 @@ class SurfaceLevel(Term):
             time: Times (k,) [s].
 
         Returns:
-            (k, n) [m].
+            Heights (k, n) [m].
         """
         raise NotImplementedError
 
@@ -49,40 +49,40 @@ class SurfaceLevel(Term):
             numbers: The term's numbers by field, each of shape (n, ...).
 
         Returns:
-            (n,) [m].
+            Mean heights (n,) [m].
         """
         raise NotImplementedError
 
     def highest(self, numbers: Numbers) -> Array:
-        """The largest height that it may reach.
+        """The largest height that the surface can reach.
 
         Args:
             numbers: The term's numbers by field, each of shape (n, ...).
 
         Returns:
-            (n,) [m].
+            Largest heights (n,) [m].
         """
         raise NotImplementedError
 
     def level_rows(self, numbers: Numbers) -> tuple[Array, dict[str, int]]:
-        """Rows of the table for device code that looks at it.
+        """Rows of the table for device code that reads the height.
 
         Args:
             numbers: The term's numbers by field, each of shape (n, ...).
 
         Returns:
-            (n, rows), and the counts of knots and harmonics by field.
+            The rows (n, rows), and the counts of knots and harmonics by field.
         """
         raise NotImplementedError
 
 
 def level_of(terms: Sequence[Any]) -> SurfaceLevel | None:
-    """The height of the surface among the terms of a scene; None where it stays at the depth 0."""
+    """The surface level among the terms of a scene; None if the surface stays at the depth 0."""
     return next((term for term in terms if isinstance(term, SurfaceLevel)), None)
 
 
 def below(thing: Any, terms: Sequence[Any]) -> Any:
-    """A term, an event or a sensor that knows the height of the surface, if it looks at the depth below it."""
+    """The term, event or sensor, with the surface level if it depends on the depth below the surface."""
     level = level_of(terms) if thing.looks_at_surface else None
     if level is thing.surface_level:
         return thing
@@ -92,7 +92,7 @@ def below(thing: Any, terms: Sequence[Any]) -> Any:
 
 
 def with_level(thing: Any, packed: Packed, parameters: Numbers) -> Packed:
-    """The packed numbers of a term, with rows of the height of the surface behind its own."""
+    """The packed numbers of a term, with the rows of the surface level after its own rows."""
     if thing.surface_level is None:
         return packed
     rows, counts = thing.surface_level.level_rows(own(thing.surface_level, parameters))
@@ -102,7 +102,7 @@ def with_level(thing: Any, packed: Packed, parameters: Numbers) -> Packed:
 
 
 def rise_above(thing: Any, time: Array, parameters: Numbers) -> Any:
-    """Height (k, n) [m] of the surface at times (k,) [s] for a thing that may know it; 0 where it does not."""
+    """Height (k, n) [m] of the surface at times (k,) [s], from the surface level of a thing; 0 if it has none."""
     return (
         0.0
         if thing.surface_level is None
@@ -111,6 +111,6 @@ def rise_above(thing: Any, time: Array, parameters: Numbers) -> Any:
 
 
 def rise_at_start(terms: Sequence[Any], parameters: Numbers) -> Any:
-    """Height (n,) [m] of the surface at t = 0 by the terms of a scene; 0 where it stays at the depth 0."""
+    """Height (n,) [m] of the surface at t = 0 from the terms of a scene; 0 if the surface stays at the depth 0."""
     level = level_of(terms)
     return 0.0 if level is None else level.height(own(level, parameters), np.zeros(1))[0]

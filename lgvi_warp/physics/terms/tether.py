@@ -13,7 +13,9 @@ from lgvi_warp.physics.terms.base import Array, Numbers, Term, number
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Tether(Term):
-    """A spring from a fixed anchor to a point of the vehicle: tension stiffness (length - rest_length), slack if shorter.
+    """A spring from a fixed anchor to a point of the vehicle.
+
+    The tension is stiffness (length - rest_length); the tether is slack if it is shorter than its rest length.
 
     Args:
         anchor: Fixed end, (3,) [m], in inertial axes.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Thrust as a function of the command, on the host: polynomials and tables, their values, and where they reach a thrust."""
+"""Thrust as a function of the command, on the host: values and inverses of polynomials and tables."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ NEUTRAL = 1e-9
 
 
 def polynomial_values(polynomial: np.ndarray, w: np.ndarray) -> np.ndarray:
-    """p_1 w + p_2 w^2 + ... of polynomials (1 or n, powers), from the first power up, at w (1 or n, k)."""
+    """Values p_1 w + p_2 w^2 + ... of polynomials (1 or n, powers), from the first power up, at w (1 or n, k)."""
     value = np.zeros_like(w)
     for coefficient in polynomial.T[::-1]:
         value = (value + coefficient[:, None]) * w
@@ -22,9 +22,9 @@ def polynomial_values(polynomial: np.ndarray, w: np.ndarray) -> np.ndarray:
 
 
 def parted(curves: np.ndarray) -> tuple[np.ndarray, bool]:
-    """Polynomials ahead and astern (1 or n, 2 powers) as lgvi_kernels.laws.thrust_curves reads them.
+    """Polynomials ahead and astern (1 or n, 2 powers) in the form that lgvi_kernels.laws.thrust_curves reads.
 
-    Returns: Of either side the odd powers, then the even ones; and whether both sides are one odd curve.
+    Returns: For each side the odd powers, then the even powers; and whether both sides form one odd curve.
     """
     ahead, astern = np.split(curves, 2, axis=1)
     rows = [side[:, first::2] for side in (ahead, astern) for first in (0, 1)]
@@ -32,7 +32,7 @@ def parted(curves: np.ndarray) -> tuple[np.ndarray, bool]:
 
 
 def table_values(at: np.ndarray, values: np.ndarray, w: np.ndarray) -> np.ndarray:
-    """Tables with knots at (1 or n, t) and values (1 or n, t, channels), at w (1 or n, channels)."""
+    """Values at w (1 or n, channels) of tables with knots `at` (1 or n, t) and values (1 or n, t, channels)."""
     value = values[:, 0] + np.zeros_like(w)
     for j in range(at.shape[1] - 1):
         share = np.clip((w - at[:, j, None]) / (at[:, j + 1] - at[:, j])[:, None], 0.0, 1.0)
@@ -41,7 +41,7 @@ def table_values(at: np.ndarray, values: np.ndarray, w: np.ndarray) -> np.ndarra
 
 
 def unfit(at: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Mask (n,) of the members whose tables (n, t), (n, t, units) fall or stand elsewhere than at 0, or give thrust at 0."""
+    """Mask (n,) of members whose tables (n, t), (n, t, units) fall, are constant at nonzero thrust, or are not 0 at 0."""
     at, values = repeated(at, values)
     change = np.diff(values, axis=1)
     idle = (values[:, 1:] == 0.0) & (values[:, :-1] == 0.0)
@@ -51,9 +51,9 @@ def unfit(at: np.ndarray, values: np.ndarray) -> np.ndarray:
 
 
 def side_of_table(at: np.ndarray, values: np.ndarray, side: float) -> tuple[np.ndarray, np.ndarray]:
-    """One side of tables of thrust (n, t) at commands (n, t), by size: from the command at which thrust begins on.
+    """One side of tables of thrust (n, t) at commands (n, t), from the command at which thrust begins.
 
-    Returns: Sizes of commands (n, t) and of thrusts (n, t), from (begin, 0) up; points of the other side are at the begin.
+    Returns: Sizes of commands (n, t) and of thrusts (n, t), from (begin, 0) up; knots of the other side are moved there.
     """
     if side < 0.0:
         at, values = -at[:, ::-1], -values[:, ::-1]
@@ -77,7 +77,7 @@ def solve(polynomial: np.ndarray, wanted: float, reach: float) -> float:
         reach: Upper end of the interval.
 
     Returns:
-        That w; where the polynomial does not reach the value, the w of its largest value.
+        This w; if the polynomial does not reach the value, the w of its largest value.
     """
     powers = np.concatenate([[-wanted], polynomial])
     slope = np.polynomial.polynomial.polyder(powers)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The electrical power of thrusters on the host: of a table of watts, or of a propeller's torque and its shaft's speed."""
+"""The electrical power of thrusters on the host, from a table of watts or from the propeller's torque and shaft speed."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ SHAFT = ("shaft_speed", "efficiency")
 
 
 def kind_of(term: Any) -> str:
-    """Relation of power to command: "watts" of a table, that of the "shaft", or "" for a term that tells none."""
+    """Relation of power to command: "watts" for a table, "shaft" for torque times shaft speed, "" if none is given."""
     if term.power is not None:
         return "watts"
     return "shaft" if term.shaft_speed is not None else ""
 
 
 def settle(term: Any, count: int) -> None:
-    """Fill in what follows from other fields; for use before the fields are checked."""
+    """Fill in fields that follow from other fields; for use before the fields are checked."""
     if term.power is not None:
         if term.power_commands is None:
             object.__setattr__(term, "power_commands", term.table_commands)
@@ -35,7 +35,7 @@ def settle(term: Any, count: int) -> None:
 
 
 def check(term: Any, faults: Faults) -> None:
-    """Add a fault for each field of the power that has no effect, or lacks another."""
+    """Add a fault for each field of the power that has no effect, or that needs another field."""
     if term.power is not None and term.shaft_speed is not None:
         faults.add("power", term.power, "is given beside shaft_speed", "keep one of them")
     if term.power is not None and term.power_commands is None:
@@ -50,7 +50,7 @@ def check(term: Any, faults: Faults) -> None:
 
 
 def shaft_rows(numbers: Numbers) -> tuple[np.ndarray, np.ndarray]:
-    """Power per |n|^3, and the part of it that is lost per n |n| and speed, (1 or n, units)."""
+    """Power per |n|^3, and loss of power per n |n| and advance speed, (1 or n, units)."""
     k = numbers["torque_coefficient"]
     speed = numbers["shaft_speed"] / numbers["efficiency"]
     loss = numbers.get("torque_loss", np.zeros_like(k))
@@ -58,7 +58,7 @@ def shaft_rows(numbers: Numbers) -> tuple[np.ndarray, np.ndarray]:
 
 
 def rows(term: Any, numbers: Numbers) -> tuple[np.ndarray, int]:
-    """Rows (1 or n, rows) of all thrusters as their device code reads them, and the intervals of a table."""
+    """Rows (1 or n, rows) of all thrusters for their device code, and the number of intervals of a table."""
     if kind_of(term) == "watts":
         at, values = numbers["power_commands"], numbers["power"]
         tables = [knots(at, values[:, :, i : i + 1]) for i in range(values.shape[2])]
@@ -68,7 +68,7 @@ def rows(term: Any, numbers: Numbers) -> tuple[np.ndarray, int]:
 
 
 def at_rest(term: Any, numbers: Numbers, w: np.ndarray) -> np.ndarray:
-    """Power (1 or n, units) [W] at commands w (1 or n, units) beyond the dead band, at no speed through the water."""
+    """Power (1 or n, units) [W] at commands w (1 or n, units) beyond the dead band, at zero speed through the water."""
     if kind_of(term) == "watts":
         return table_values(numbers["power_commands"], numbers["power"], w)
     per_cube, _ = shaft_rows(numbers)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Thrusters with a thrust curve (square, polynomial or table), dead band, saturation, lag, and loss by the advance speed."""
+"""Thrusters with a thrust curve (square, polynomial or table), dead band, saturation, lag, and loss by advance speed."""
 
 from __future__ import annotations
 
@@ -43,40 +43,40 @@ from lgvi_warp.physics.terms.thrust_curves import (
 class Thrusters(Commanded):
     """n thrusters, each with thrust = c+ f+(max(u - band, 0)) - c- f-(max(-u - band, 0)) along its direction (Fossen 2021, 9).
 
-    f(w) = polynomial_1 w + polynomial_2 w^2 + ..., by default w^2, or a table. u is the command within its limit, after the
-    lag and no faster than the rate limit. One number stands for n equal ones. The unit of the command is the user's: 1, V or
-    rad/s.
+    f(w) = polynomial_1 w + polynomial_2 w^2 + ..., by default w^2, or a table. u follows the command after the lag, within
+    the limit and the rate limit. A single number stands for n equal numbers. The user chooses the unit of the command, such
+    as 1, V or rad/s.
 
-    Beyond the dead band, w = sign(u) max(|u| - band, 0), thrust falls by advance_loss |w| a and torque by torque_loss |w| a,
+    Beyond the dead band, w = sign(u) max(|u| - band, 0). Thrust falls by advance_loss |w| a and torque by torque_loss |w| a,
     where a is the speed of the thruster through the water along its direction (Fossen 2021, 9.1).
 
     Args:
-        position: Where each thrust acts, (n, 3) [m] from the body's origin.
-        direction: Direction in which it pushes the vehicle, (n, 3), of any length but 0.
-        coefficient: Coefficient c+ ahead, (n,) [N per unit of f]; 1 by default where a polynomial [N] is given.
+        position: Point at which each thrust acts, (n, 3) [m] from the body's origin.
+        direction: Direction in which each thruster pushes the vehicle, (n, 3), of any length but 0.
+        coefficient: Coefficient c+ ahead, (n,) [N per unit of f]; 1 by default if a polynomial [N] is given.
         coefficient_astern: Coefficient c- astern, (n,) [N per unit of f]; by default that ahead.
         polynomial: Polynomial f+ of all thrusters, (p,), from the first power up; w^2 by default.
         polynomial_astern: Polynomial f- of all thrusters, (q,), from the first power up; by default that ahead.
-        table_commands: Commands of a table of thrust, (t,) [unit], rising; in place of polynomials. None by default.
-        table_thrusts: Thrusts at these commands, (t, n) [N], or (t,) for n equal thrusters, linear between them and constant
-            outside. They rise, and are 0 at the command 0; some may be 0 around it.
-        advance_loss: Loss of thrust c_u ahead, (n,) [N per unit and m/s]; none by default.
+        table_commands: Commands of a table of thrust, (t,) [unit], rising; instead of polynomials. None by default.
+        table_thrusts: Thrusts at these commands, (t, n) [N], or (t,) for n equal thrusters, linear between the commands and
+            constant outside. They must rise and be 0 at the command 0; near this command several may be 0.
+        advance_loss: Loss of thrust c_u ahead, (n,) [N per unit and m/s]; by default no loss.
         advance_loss_astern: Loss of thrust c_u astern, (n,) [N per unit and m/s]; by default that ahead.
-        torque_coefficient: Torque on the vehicle about the direction, for a unit of w |w|, (n,) [N m per unit^2]: its sign is
-            that of the propeller's hand. None by default.
+        torque_coefficient: Torque on the vehicle about the direction per unit of w |w|, (n,) [N m per unit^2]. Its sign
+            depends on the propeller's sense of rotation. None by default.
         torque_loss: Loss of torque, (n,) [N m per unit and m/s], with the sign of the torque; 0 by default.
-        power_commands: Commands of a table of power, (s,) [unit], rising, counted from the dead band as those of thrust; by
+        power_commands: Commands of a table of power, (s,) [unit], rising, beyond the dead band like those of thrust; by
             default `table_commands`.
-        power: Electrical power at these commands, (s, n) [W], or (s,) for n equal thrusters, linear between them and constant
-            outside. None by default: they take no power (see `EnergyUse`).
-        shaft_speed: Rate of turn of the propeller for a unit of w, (n,) [rad/s per unit], in place of a table: the power is
-            that of the shaft's torque. None by default.
-        efficiency: Mechanical power of the shaft over electrical power, (n,); 1 by default.
+        power: Electrical power at these commands, (s, n) [W], or (s,) for n equal thrusters, linear between the commands and
+            constant outside. None by default, for no power (see `EnergyUse`).
+        shaft_speed: Angular speed of the propeller per unit of w, (n,) [rad/s per unit], instead of a table. The power is then
+            torque times shaft speed, divided by the efficiency. None by default.
+        efficiency: Mechanical power of the shaft divided by electrical power, (n,); 1 by default.
         dead_band: Size of the command below which there is no thrust, (n,) [unit]; 0 by default.
         limit: Largest size of the command, (n,) [unit]; 1e6 by default.
-        time_constant: Time constant of the first-order lag from the command to u, (n,) [s]; 0 by default, no lag.
-        rate_limit: Largest rate of u, (n,) [unit/s]; none by default.
-        command: Command that is held, (n,) [unit]; 0 by default.
+        time_constant: Time constant of the first-order lag from the command to u, (n,) [s]; 0 by default, for no lag.
+        rate_limit: Largest rate of u, (n,) [unit/s]; by default no limit.
+        command: Constant command, (n,) [unit]; 0 by default.
         times: Times of the schedule, (k,) [s], rising.
         command_schedule: Commands at these times, (k, n) [unit], linear between them; instead of `command`.
 
@@ -85,9 +85,9 @@ class Thrusters(Commanded):
         command_for: The smallest commands that give these thrusts.
 
     Raises:
-        SceneError: If a direction has no length, times do not rise, the command is given twice, or neither a coefficient
-            nor a polynomial nor a table is given; where a table does not rise, or stands beside a polynomial. Also if a
-            number is invalid (see `Term`).
+        SceneError: If a direction has length 0, times or a table do not rise, the command is given twice, a table is given
+            together with a polynomial, or none of coefficient, polynomial and table is given. Also if a number is invalid
+            (see `Term`).
 
     Examples:
         >>> import lgvi_warp as lw
@@ -160,12 +160,12 @@ class Thrusters(Commanded):
 
     @property
     def propels(self) -> bool:
-        """Whether thrust falls with the advance speed, or propellers turn the vehicle."""
+        """Whether thrust falls with the advance speed, or propellers exert a torque on the vehicle."""
         return any(getattr(self, name) is not None for name in PROPELLER)
 
     @property
     def powered(self) -> str:
-        """Relation of its power to the command, in a scene that accounts it (see thruster_power.kind_of)."""
+        """Relation of power to command, in a scene that accounts the energy used (see thruster_power.kind_of)."""
         return thruster_power.kind_of(self) if self.accounted else ""
 
     @property
@@ -177,7 +177,7 @@ class Thrusters(Commanded):
 
     @property
     def is_square(self) -> bool:
-        """Whether the curves ahead and astern are both w^2."""
+        """Whether the curves ahead and astern are w^2."""
         return all(np.array_equal(curve, SQUARE) for curve in (self.polynomial, self.polynomial_astern))
 
     @property
@@ -193,7 +193,7 @@ class Thrusters(Commanded):
 
     @property
     def pushes_steadily(self) -> bool:
-        """Whether its force and torque never change in body axes: commands are held, and no thrust falls with the speed."""
+        """Whether force and torque are constant in body axes, since commands are constant and thrust has no advance loss."""
         lossless = self.advance_loss is None and self.torque_loss is None
         return self.driver is None and self.holds and lossless
 
@@ -213,7 +213,7 @@ class Thrusters(Commanded):
 
     @property
     def pattern_device(self) -> str:  # type: ignore[override]
-        """Device code that leaves out zeros of the wrenches of thrusters without propellers, of which there are few."""
+        """Device code that leaves out zeros of the wrenches, for few thrusters without advance loss and torque."""
         return "" if self.pushes_steadily or self.propels or self.channels > MOST_UNROLLED else self.device_in(True)
 
     def entries(self, numbers: Numbers) -> tuple[str, ...]:
@@ -225,13 +225,13 @@ class Thrusters(Commanded):
         return words + tuple(f"{i}f{j}" for i in range(self.channels) for j in range(6) if np.any(rows[:, i, j]))
 
     def _plain(self, numbers: Numbers, odd: bool) -> bool:
-        """Whether in all members both sides are alike, and there is no dead band; odd: whether the curves are."""
+        """Whether all members have equal thrust ahead and astern and no dead band; odd: Whether the curves are odd."""
         alike = np.all(numbers["coefficient"] == numbers["coefficient_astern"])
         return bool(odd and alike and not np.any(numbers["dead_band"]))
 
     @property
     def powers(self) -> int:
-        """Number of powers that the longer of both polynomials has."""
+        """Number of powers of the longer polynomial."""
         return max(len(self.polynomial), len(self.polynomial_astern))
 
     def to_dict(self) -> dict[str, Any]:
@@ -253,7 +253,7 @@ class Thrusters(Commanded):
         return self._thrusts(numbers, self._beyond(numbers, np.atleast_2d(command))).reshape(command.shape)
 
     def largest_thrust(self, numbers: Numbers, command: np.ndarray) -> np.ndarray:
-        """Largest size of the steady thrusts of any thruster at commands of either sign.
+        """Largest steady thrust of any thruster at commands of either sign, as a size.
 
         Args:
             numbers: The term's numbers by field.
@@ -266,12 +266,12 @@ class Thrusters(Commanded):
         return np.asarray(np.maximum(*both).max(axis=1))
 
     def _beyond(self, numbers: Numbers, command: np.ndarray) -> np.ndarray:
-        """Commands (n, units) within their limits, less the dead band."""
+        """Commands (n, units) within their limits, minus the dead band."""
         u = np.clip(command, -numbers["limit"], numbers["limit"])
         return np.asarray(np.sign(u) * np.maximum(np.abs(u) - numbers["dead_band"], 0.0))
 
     def _thrusts(self, numbers: Numbers, w: np.ndarray) -> np.ndarray:
-        """Thrusts (n, units) [N] at rest, of places w (n, units) less the dead band."""
+        """Thrusts (n, units) [N] at zero advance speed, for commands w (n, units) beyond the dead band."""
         if self.shape == "table":
             f = table_values(numbers["table_commands"], numbers["table_thrusts"], w)
         else:
@@ -294,7 +294,7 @@ class Thrusters(Commanded):
             thrust: Thrusts (n,), or one number for all [N].
 
         Returns:
-            Commands (n,) [unit of the command]; where a curve does not reach the thrust, the command of its largest thrust.
+            Commands (n,) [unit of the command]; if a curve does not reach the thrust, the command of its largest thrust.
         """
         least_commands = np.zeros(len(self.coefficient))
         for i, wanted in enumerate(np.broadcast_to(np.asarray(thrust, dtype=np.float64), least_commands.shape)):
@@ -347,7 +347,7 @@ class Thrusters(Commanded):
         return bad
 
     def _refuse_idle_polynomial(self, numbers: Numbers) -> None:
-        """Refuse members' polynomials in a scene that has none, since its device code does not read them."""
+        """Refuse members' polynomials in a scene without polynomials, whose device code does not read them."""
         faults = Faults(f"{self.key}.")
         for name in ("polynomial", "polynomial_astern"):
             if self.is_square and not np.all(numbers[name] == SQUARE):
@@ -390,7 +390,7 @@ class Thrusters(Commanded):
     def _packed_push(
         self, numbers: Numbers, context: PackingContext, direction: np.ndarray, arms: np.ndarray
     ) -> Packed:
-        """The force and the torque of held commands; direction, arms: force and torque of a unit of thrust, (n, units, 3)."""
+        """Force and torque of constant commands; direction, arms: Force and torque per unit of thrust, (n, units, 3)."""
         # Members whose numbers overflow fail in their first step.
         with np.errstate(over="ignore", invalid="ignore"):
             w = self._beyond(numbers, numbers["command"])
@@ -405,14 +405,14 @@ class Thrusters(Commanded):
             return Packed(values)
 
     def curve_rows(self, numbers: Numbers) -> tuple[np.ndarray, int]:
-        """The curves as an allocation reads them.
+        """The thrust curves in the form that an allocation reads.
 
         Args:
             numbers: The term's numbers by field.
 
         Returns:
-            Rows (1 or n, rows): none of a square, the polynomials ahead and astern, or a table for each thruster; and how many
-            powers, or intervals, there are.
+            Rows (1 or n, rows): none for a square, the polynomials ahead and astern, or a table for each thruster; and the
+            number of powers or intervals.
         """
         if self.shape == "square":
             return np.zeros((1, 0)), 0
@@ -431,7 +431,7 @@ OPTIONAL = (*PROPELLER, "rate_limit")
 
 
 def _summed(sizes: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    """The sum of vectors (n, units, 3) times sizes (n, units), one after the other: whatever n is, with the same bits."""
+    """The sum of vectors (n, units, 3) times sizes (n, units), added one by one, so that the bits do not depend on n."""
     total = np.zeros((1, 3))
     for i in range(vectors.shape[1]):
         total = total + sizes[:, i, None] * vectors[:, i]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Linear waves: what every sea has, and waves whose components are given."""
+"""Linear waves: the base class of all seas, and waves with given components."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ MISS = 1e-9
 
 
 class Components(NamedTuple):
-    """Components of a sea, (n, k) each; the first are the rows of lgvi_kernels/laws/waves.py.
+    """Components of a sea, (n, k) each; the first ones are the rows of lgvi_kernels/laws/waves.py.
 
-    north, east, k: wavenumber along the axes and in all [1/m]. omega: frequency at a fixed place [rad/s]. phase [rad].
-    ahead, aside: heading, north and east. speed: a sigma, sigma the frequency in the water [m/s]; over 1 - decay^2.
-    decay: e^(-k h), h the depth of the sea; 0 in deep water. amplitude: of the surface [m], 0 where the current blocks a wave.
-    blocked: where an opposing current lets no wave of this frequency travel.
+    north, east, k: Components and size of the wavenumber [1/m]. omega: Frequency at a fixed point [rad/s]. phase: [rad].
+    ahead, aside: North and east components of the heading. speed: a sigma / (1 - decay^2) [m/s], where a is the amplitude and
+    sigma the frequency in the water. decay: e^(-k h), where h is the depth of the sea; 0 in deep water. amplitude: Of the
+    surface [m]; 0 for a blocked wave. blocked: Mask of waves that cannot travel against an opposing current.
     """
 
     north: Array
@@ -49,16 +49,16 @@ class Components(NamedTuple):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class WaveTerm(Term):
-    """Linear waves, a sum of components. Abstract.
+    """Base class of linear waves, a sum of components. Abstract.
 
     Args:
         depth: Depth of the sea [m], above 0; inf for deep water.
-        periods_of: Who sees the periods where a uniform current acts: "ground", the default, a fixed place; "water", whoever
-            drifts with the current. The other one sees them shifted (Doppler).
+        periods_of: Frame of the periods in a uniform current: "ground", the default, a fixed point; or "water", a point that
+            drifts with the current. In the other frame the periods have a Doppler shift.
 
     Attributes:
-        period: Period of the highest wave [s]; None where there are no waves.
-        periods_field: The field that holds periods.
+        period: Period of the highest wave [s]; None if there are no waves.
+        periods_field: Name of the field that holds periods.
 
     Methods:
         sea: Amplitudes, frequencies, headings and phases of the components.
@@ -83,7 +83,7 @@ class WaveTerm(Term):
     periods_of: str = word("ground", known=("ground", "water"))
 
     def known_of(self, terms: Sequence[Term]) -> dict[str, Any]:
-        """What it knows of the other terms of its scene, by attribute."""
+        """{attribute: terms} of the other terms of the scene that the waves depend on."""
         return {"currents": tuple(other for other in terms if other.carries)}
 
     def beside(self, terms: Sequence[Term]) -> Any:
@@ -97,17 +97,17 @@ class WaveTerm(Term):
 
     @property
     def period(self) -> float | None:
-        """Period of the highest wave [s]; None where there are no waves."""
+        """Period of the highest wave [s]; None if there are no waves."""
         raise NotImplementedError
 
     def sea(self, numbers: Numbers) -> tuple[Array, Array, Array, Array]:
-        """Amplitudes [m], frequencies as `periods_of` says [rad/s], headings and phases [rad] of the components.
+        """Amplitudes [m], frequencies in the frame of `periods_of` [rad/s], headings and phases [rad] of the components.
 
         Args:
             numbers: The term's numbers by field, each of shape (n, ...).
 
         Returns:
-            (n, k) each.
+            Four arrays (n, k).
         """
         raise NotImplementedError
 
@@ -119,13 +119,13 @@ class WaveTerm(Term):
             parameters: All parameters of the scene, by name.
 
         Returns:
-            (n,).
+            Steepness (n,).
         """
         raise NotImplementedError
 
     @property
     def finite(self) -> bool:
-        """Whether the sea has a floor."""
+        """Whether the sea has a finite depth."""
         return self.floor is not None or (self.depth is not None and bool(np.isfinite(self.depth)))
 
     def wave_table(self, numbers: Numbers, parameters: Numbers) -> Components:
@@ -136,7 +136,7 @@ class WaveTerm(Term):
             parameters: All parameters of the scene, by name.
 
         Returns:
-            (n, k) each.
+            The components, arrays of shape (n, k).
         """
         amplitude, omega, heading, phase = self.sea(numbers)
         g = parameters["environment.gravity"][:, None]
@@ -155,7 +155,7 @@ class WaveTerm(Term):
         return Components(*np.broadcast_arrays(*rows))
 
     def _current(self, parameters: Numbers) -> Array | None:
-        """Velocity (n, 3) [m/s] of the uniform currents; None where there are none."""
+        """Total velocity (n, 3) [m/s] of the uniform currents; None if there are none."""
         flows = []
         for term in self.currents:
             numbers = own(term, parameters)
@@ -216,7 +216,7 @@ class WaveTerm(Term):
 
         Args:
             numbers: The term's numbers by field, each of shape (n, ...).
-            position: Positions (k, n, 3) [m] in inertial axes, whose depths do not count.
+            position: Positions (k, n, 3) [m] in inertial axes; their depths are not used.
             time: Times (k,) [s].
             parameters: All parameters of the scene, by name.
 
@@ -235,7 +235,7 @@ class WaveTerm(Term):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Waves(WaveTerm, Harmonics):
-    """A sum of linear waves, whose frequency in the water is sqrt(g k tanh(k depth)).
+    """A sum of linear waves with the dispersion relation sqrt(g k tanh(k depth)) for their frequency in the water.
 
     Args:
         amplitudes: Amplitudes of the surface, (k,) [m].
@@ -243,11 +243,11 @@ class Waves(WaveTerm, Harmonics):
         phases: Phases at t = 0 at the inertial origin, (k,) [rad]; 0 by default.
         headings_deg: Directions in which the waves travel, (k,) [deg] from north.
         depth: Depth of the sea [m], above 0; by default the water is deep.
-        periods_of: Frame of the periods in a uniform current: "ground", the default, as at a fixed place; or "water", as
-            when drifting with the current.
+        periods_of: Frame of the periods in a uniform current: "ground", the default, a fixed point; or "water", a point that
+            drifts with the current.
 
     Raises:
-        SceneError: If a period is not above 0; or a number is invalid (see `Term`).
+        SceneError: If a period is not above 0, or a number is invalid (see `Term`).
     """
 
     type: ClassVar[str] = "waves"
@@ -286,17 +286,17 @@ class Waves(WaveTerm, Harmonics):
 
 
 def waves_of(terms: Sequence[Term]) -> tuple[WaveTerm, ...]:
-    """The waves among the terms and events of a scene, knowing the others."""
+    """The waves among the terms and events of a scene, with access to the others."""
     return tuple(term.beside(terms) for term in terms if isinstance(term, WaveTerm))
 
 
 def water_of(waves: Sequence[WaveTerm]) -> str:
-    """The water of some waves, as a feature of device code: "finite" where it has a floor anywhere, else "waves"."""
+    """Feature of the device code for some waves: "finite" if any of them is in finite depth, else "waves"."""
     return "finite" if any(term.finite for term in waves) else "waves"
 
 
 def pressure_rows(waves: Sequence[WaveTerm], parameters: Numbers) -> tuple[list[Array], int]:
-    """Rows (n, rows) of each of some waves for device code that reads surface and pressure, and the count of components."""
+    """Rows (n, rows) of each wave term for device code that reads surface and pressure, and the count of components."""
     rows, count, finite = [], 0, water_of(waves) == "finite"
     for term in waves:
         c = term.wave_table(own(term, parameters), parameters)
@@ -307,9 +307,9 @@ def pressure_rows(waves: Sequence[WaveTerm], parameters: Numbers) -> tuple[list[
 
 
 def wavenumbers(omega: Array, drift: Any, depth: Any, gravity: Array) -> Array:
-    """Wavenumbers k [1/m] with sqrt(g k tanh(k h)) + k U = omega (Peregrine 1976); NaN where an opposing current blocks them.
+    """Wavenumbers k [1/m] with sqrt(g k tanh(k h)) + k U = omega (Peregrine 1976); NaN for waves that a current blocks.
 
-    omega [rad/s], (n, k). drift: U, the current along each wave [m/s]. depth: h [m]; inf for deep water. gravity [m/s2].
+    omega: [rad/s], (n, k). drift: U, the current along each wave [m/s]. depth: h [m]; inf for deep water. gravity: [m/s2].
     """
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         # In deep water sigma + U sigma^2 / g = omega.

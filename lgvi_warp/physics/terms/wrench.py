@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A force and torque in body axes that is constant, or follows a schedule."""
+"""A force and torque in body axes, constant or by a schedule."""
 
 from __future__ import annotations
 
@@ -57,10 +57,10 @@ class WrenchSchedule(Term):
         times: Times, (k,) [s], rising.
         force: Forces at these times, (k, 3) [N].
         torque: Torques at these times, (k, 3) [N m]; 0 by default.
-        interpolation: "linear" between the times, the default; or "steps", each value held until the next time.
+        interpolation: "linear", the default, between the times; or "steps", with each value constant until the next time.
 
     Raises:
-        SceneError: If times do not rise; or a number is invalid (see `Term`).
+        SceneError: If times do not rise, or a number is invalid (see `Term`).
     """
 
     type: ClassVar[str] = "wrench_schedule"
@@ -78,7 +78,7 @@ class WrenchSchedule(Term):
 
     @property
     def jumps(self) -> bool:
-        """Whether the values jump at the times, which a run meets at whole steps."""
+        """Whether the values jump at the times; a run must reach these times at whole steps."""
         return self.interpolation == "steps"
 
     def drive(self) -> np.ndarray:
@@ -95,12 +95,12 @@ class WrenchSchedule(Term):
 
 
 def commands(numbers: Numbers) -> tuple[np.ndarray, np.ndarray]:
-    """Times (n, k) [s] and commands (n, k, units) of a term; a command that is held is the only row of the schedule."""
+    """Times (n, k) [s] and commands (n, k, units) of a term; a constant command is a schedule of one row."""
     schedule = numbers["command_schedule"]
     return numbers["times"], numbers["command"][:, None, :] if schedule.shape[1] == 1 else schedule
 
 
 def at_start(times: np.ndarray, schedule: np.ndarray, start: float = 0.0) -> np.ndarray:
-    """Commands (n, columns) at the start [s] of schedules (1 or n, k, columns) with times (1 or n, k) [s]."""
+    """Commands (n, columns) at the time `start` [s] of schedules (1 or n, k, columns) with times (1 or n, k) [s]."""
     members = zip(*repeated(times, schedule), strict=True)
     return np.array([[np.interp(start, at, column) for column in commands.T] for at, commands in members])

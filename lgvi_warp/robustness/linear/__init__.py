@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Steady motions, linear models of a period, and how far a loop is from the edge."""
+"""Steady motions, linear models of one period, and stability margins of loops."""

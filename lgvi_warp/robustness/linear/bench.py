@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Members in any motion and with any memory, some steps later: what linear models and margins stand on."""
+"""Advance members by some steps from any motion and any memory; linear models and margins are built on this."""
 
 from __future__ import annotations
 
@@ -42,9 +42,9 @@ Watch = Callable[[int, Mapping[str, np.ndarray]], None]
 
 @dataclass(frozen=True)
 class Motion:
-    """Motions of m members, shaped as in `lw.Start`, and what they remember.
+    """Motions of m members, shaped as in `lw.Start`, and their memory.
 
-    memory: by key of a term or a part, (m, rows); under "" that of the controller's bus.
+    memory: key of a term or a part -> (m, rows); the key "" is the controller's bus.
     """
 
     position: np.ndarray
@@ -59,11 +59,11 @@ class Motion:
         return Motion(**states, memory={key: rows[places] for key, rows in self.memory.items()})
 
     def copied_memory(self) -> dict[str, np.ndarray]:
-        """Memory of the members, a copy to change."""
+        """Copy of the members' memory, which may be changed."""
         return {key: rows.copy() for key, rows in self.memory.items()}
 
     def moved(self, by: np.ndarray) -> Motion:
-        """The motions a little beside these.
+        """The motions, changed by small amounts.
 
         by: (m, 12): position [m], inertial axes; rotation vector [rad], body axes; velocity and angular velocity.
         """
@@ -74,7 +74,7 @@ class Motion:
             angular_velocity=self.angular_velocity + rate)  # fmt: skip
 
     def apart(self, others: Motion) -> np.ndarray:
-        """Difference from others, in the coordinates of `moved` (m, 12)."""
+        """Difference from other motions (m, 12), in the coordinates of `moved`."""
         R = np.swapaxes(others.attitude, 1, 2) @ self.attitude
         skew = 0.5 * np.stack([R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]], axis=1)
         sine = np.linalg.norm(skew, axis=1, keepdims=True)
@@ -87,10 +87,10 @@ class Motion:
 class MotionBench:
     """A plan whose members start from any motion, with any memory, after any step but the first.
 
-    Its kernel has no merged lead: what lies in its state between two launches is the motion itself.
+    Its kernel does not merge parts of successive steps, so its state between two launches is the motion itself.
 
-    h: step [s]; None for the scene's. t1: the longest run [s]. spacing: time between two samples [s].
-    Its `every` is the number of steps between two ticks, 1 without a controller.
+    h: step [s]; None for the scene's step. t1: the longest run [s]. spacing: time between two samples [s]. The
+    attribute `every` is the number of steps between two ticks, 1 without a controller.
     """
 
     def __init__(
@@ -122,7 +122,7 @@ class MotionBench:
         return tuple(term.key for term, _ in (*choice.laws, *choice.parts_of_control, *choice.events))
 
     def start(self, places: np.ndarray) -> Motion:
-        """The motions of members (m,) at t = 0, and what they remember before the first tick."""
+        """The motions of members (m,) at t = 0, and their memory before the first tick."""
         packets = self._filled(places, None, {})
         start = packets.members
         states: Any = {name: getattr(start, name) for name in FIELDS}
@@ -131,7 +131,7 @@ class MotionBench:
         return Motion(**states, memory=memory)
 
     def commanded(self, motion: Motion, commands: Mapping[str, np.ndarray]) -> Motion:
-        """The motions with actuators that are at these commands (m, channels), by key."""
+        """The motions with the actuators at given commands, key -> (m, channels)."""
         memory = motion.copied_memory()
         for key, (begin, count) in (self.bus.commands if self.bus else {}).items():
             if key in commands:
@@ -144,11 +144,11 @@ class MotionBench:
         self, places: np.ndarray, motion: Motion | None, k0: int, k1: int,
         numbers: Mapping[str, np.ndarray] | None = None, watch: Watch | None = None,
     ) -> Motion:  # fmt: skip
-        """Make the steps from k0 to k1 of members (m,), with numbers (m, ...) by name in place of theirs.
+        """Advance members (m,) from step k0 to step k1; numbers: name -> (m, ...) that replace the members' own.
 
-        motion: after the tick at step k0; None for their own at t = 0, with k0 = 0.
-        watch: called with the number of the first sample of a piece and its samples, piece by piece.
-        Returns: The motions after k1 steps and the tick at them; NaN where a member failed.
+        motion: motions after the tick at step k0; None starts from the members' own at t = 0, with k0 = 0.
+        watch: called for each block of samples, with the number of its first sample and the samples.
+        Returns: The motions after step k1 and its tick; NaN for members that failed.
         """
         plan, m = self.plan, len(places)
         packets = self._filled(places, motion, numbers or {})
@@ -169,7 +169,7 @@ class MotionBench:
         return Motion(**states, memory=memory)
 
     def _filled(self, places: np.ndarray, motion: Motion | None, numbers: Mapping[str, np.ndarray]) -> Packets:
-        """Packets of members in these motions."""
+        """Build packets of members in these motions."""
         subset, m = self.fleet.subset(places), len(places)
         members = subset.select(0, m)
         members = replace(members, parameters={**members.parameters, **numbers})
@@ -204,7 +204,7 @@ class MotionBench:
 
 
 def calm(scene: Any, purpose: str) -> None:
-    """Refuse a scene in which something acts by chance or in waves: no motion of it is steady."""
+    """Refuse a scene with noise or waves: it has no steady motion."""
     for term in scene.terms:
         if isinstance(term, NoisyTerm | WaveTerm):
             problem = f"lets no motion be steady, as {purpose} need it"
@@ -212,7 +212,7 @@ def calm(scene: Any, purpose: str) -> None:
 
 
 def plant(scene: Scene, period: float, extra: Sequence[Any] = ()) -> Scene:
-    """A scene whose actuators hold what they are commanded for a period [s]: no law acts on them."""
+    """A scene without control laws, whose actuators hold their commands for a period [s]."""
     terms = [*scene.terms, *extra]
     able = [term for term in terms if term.channels and not term.own_commands]
     if not able:

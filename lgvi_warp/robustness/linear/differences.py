@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Central differences of some steps of many members, in lanes: every number that is moved has two copies of a member."""
+"""Central differences of some steps of many members: each changed number has two copies of every member, in lanes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ STEP = 1e-5
 
 @dataclass(frozen=True)
 class Row:
-    """A number that is remembered."""
+    """A number in the memory."""
 
     key: str
     row: int
@@ -24,13 +24,13 @@ class Row:
 
 
 def names_of(rows: Sequence[Row]) -> tuple[str, ...]:
-    """Names of the states: the motion, then what is remembered."""
+    """Names of the states: the motion, then the memory."""
     return (*COORDINATES, *(row.name for row in rows))
 
 
 @dataclass(frozen=True)
 class Differences:
-    """Derivatives of the motion and of the rows `derived` after some steps, by the motion and the rows `moved` at step k0."""
+    """Derivatives of motion and rows `derived` after some steps by motion and rows `moved` at step k0."""
 
     bench: MotionBench
     k0: int
@@ -43,9 +43,9 @@ class Differences:
     def __call__(
         self, places: np.ndarray, about: Motion, numbers: Mapping[str, np.ndarray] | None = None
     ) -> np.ndarray:
-        """The derivatives of members (n,), with numbers (n, ...) by name in place of theirs.
+        """The derivatives of members (n,); numbers: name -> (n, ...) that replace the members' own.
 
-        Returns: (n, 12 + derived, 12 + moved), or without the motion (n, 12 + derived, moved); NaN where a copy failed.
+        Returns: (n, 12 + derived, 12 + moved), or without the motion (n, 12 + derived, moved); NaN if a copy failed.
         """
         most = max(1, AT_ONCE // (2 * max(12 * self.motion + len(self.moved), 1)))
         parts = []

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Disk margins of sampled loops: the gain and phase that all components of a demand bear at once, at any frequency.
+"""Disk margins of sampled loops: tolerated simultaneous changes of gain and phase in all components of a demand.
 
 Seiler, Packard, Gahinet (2020), An introduction to disk margins, IEEE Control Systems Magazine 40(5).
 """
@@ -17,7 +17,7 @@ BALANCINGS, RATES = 12, 0.5 * 0.95 ** np.arange(40)
 
 
 class Response:
-    """L(e^(i angle)) of one loop, negative feedback, (k, r, r) at angles (k,), by its Schur form."""
+    """Response L(e^(i angle)) of one loop with negative feedback, (k, r, r) at angles (k,), by its Schur form."""
 
     def __init__(self, A: np.ndarray, B: np.ndarray, C: np.ndarray):
         from scipy.linalg import schur
@@ -31,7 +31,7 @@ class Response:
         return self.demands(self.states(angles))
 
     def states(self, angles: np.ndarray) -> np.ndarray:
-        """(z - A)^-1 B in Schur's axes, (k, n, r)."""
+        """Compute (z - A)^-1 B in Schur axes, (k, n, r)."""
         T, B = self._T, self._B
         x = np.zeros((len(angles), *B.shape), complex)
         z = np.exp(1j * angles)[:, None]
@@ -40,30 +40,30 @@ class Response:
         return x
 
     def demands(self, x: np.ndarray) -> np.ndarray:
-        """L (k, r, r) of states in Schur's axes."""
+        """L (k, r, r) from states in Schur axes."""
         return np.asarray(-self._C @ x)
 
     def closed(self, turn: float) -> np.ndarray:
-        """Poles of the loop that is closed with this turn [rad] in each of its commands."""
+        """Poles of the closed loop with this phase shift [rad] in each of its commands."""
         return np.linalg.eigvals(self._T + np.exp(1j * turn) * (self._B @ self._C))
 
     def rows(self, outputs: np.ndarray) -> np.ndarray:
-        """Rows (p, n) of the states in Schur's axes."""
+        """Rows (p, n) of outputs, transformed to Schur axes."""
         return np.asarray(outputs @ self._Z)
 
 
 def grid_of(response: Response) -> np.ndarray:
-    """Angles [rad a period] at which a loop is looked at: a grid, and those of its poles."""
+    """Angles [rad per period] at which a loop is evaluated: a grid, and the angles of its poles."""
     turning = np.abs(np.angle(response.poles))
     turning = turning[(turning > LOWEST * np.pi) & (turning < np.pi)]
     return np.unique(np.concatenate([np.pi * np.geomspace(LOWEST, 1.0, GRID), turning]))
 
 
 def scaled_norms(M: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Largest singular values (k,) of D M D^-1 with diagonal D that make them nearly least, and log D (k, r).
+    """Largest singular values (k,) of D M D^-1 with a diagonal D that nearly minimises them, and log D (k, r).
 
-    Their least bounds the structured singular value for independent complex numbers, and is it for up to three of them
-    (Packard, Doyle 1993, Automatica 29(1)).
+    Their minimum over D bounds the structured singular value for independent complex numbers; for up to three it is
+    exact (Packard, Doyle 1993, Automatica 29(1)).
     """
     x = np.zeros(M.shape[:2])
     best, at = np.linalg.norm(M, 2, axis=(1, 2)), x
@@ -86,7 +86,7 @@ def scaled_norms(M: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def least_norm(M: np.ndarray, start: np.ndarray) -> float:
-    """The least of `scaled_norms` of one matrix (r, r), to 1e-5 of it: it is convex in log D."""
+    """Minimum over D of the norm in `scaled_norms`, for one matrix (r, r), to relative 1e-5; it is convex in log D."""
     from scipy.optimize import minimize
 
     def norm(x: np.ndarray) -> float:
@@ -103,7 +103,7 @@ def least_norm(M: np.ndarray, start: np.ndarray) -> float:
 
 
 def peak(response: Response, skew: float) -> tuple[float, float]:
-    """The largest structured norm of S + (skew - 1)/2 over frequencies, and where [rad a period]."""
+    """The largest structured norm of S + (skew - 1)/2 over frequency, and its angle [rad per period]."""
 
     def matrices(angles: np.ndarray) -> np.ndarray:
         L = response(angles)
@@ -134,7 +134,7 @@ def peak(response: Response, skew: float) -> tuple[float, float]:
 
 
 def disks(opened: Opened, skew: float, period: float) -> dict[str, np.ndarray]:
-    """Disk margins by name (m,) of loops that settle."""
+    """Disk margins of loops that settle, name -> (m,)."""
     each = [peak(Response(*loop), skew) for loop in zip(opened.A, opened.B, opened.C, strict=True)]
     norm, angle = np.array(each).reshape(-1, 2).T
     with np.errstate(divide="ignore"):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Bisection of members from one answer to the other: all brackets are divided at once."""
+"""Bisection for the edge between two answers, for all members at once."""
 
 from __future__ import annotations
 
@@ -14,11 +14,12 @@ Holds = Callable[[np.ndarray, np.ndarray], np.ndarray]
 def edges(
     holds: Holds, start: np.ndarray, last: np.ndarray, guess: np.ndarray, narrow: float, whole_numbers: bool = False
 ) -> np.ndarray:
-    """Find, for each member (n,), where an answer that holds at the start ceases to, between there and the last value.
+    """Find for each member (n,) the edge, from `start` to `last`, of a condition that holds at `start`.
 
-    Brackets grow from the guess by steps that double, and are then halved, in the logarithm; whole numbers as they are.
-    start, guess: NaN for members that are not asked, and (or infinite) where nobody knows.
-    Returns: (n, 2): the values nearest to the edge where it holds, and where it does not; infinite or 0 without an edge.
+    Brackets grow from the guess by doubling steps, and are then halved; in the logarithm, except for whole numbers.
+    start: NaN for members that are left out. guess: NaN or infinite if there is no guess.
+    Returns: (n, 2): the nearest values at which the condition holds and fails; without an edge, the latter is infinite
+        or 0.
     """
     forward, backward = (lambda v: v, lambda v: v) if whole_numbers else (np.log, np.exp)
     n, least = len(start), 1.0 if whole_numbers else narrow

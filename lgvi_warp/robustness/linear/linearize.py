@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`linearize`: the linear model of a period about a motion, with hold, lag and method as they are in the run."""
+"""`linearize`: linear model of one period about a motion; hold, lags and method are as in the run."""
 
 from __future__ import annotations
 
@@ -31,22 +31,21 @@ INPUTS = ("commands", "wrench")
 @explained
 @dataclass(frozen=True)
 class LinearModel:
-    """x' = A x + B u after a period, y = C x + D u: deviations from a motion.
+    """Discrete linear model of deviations from a motion: x' = A x + B u after one period, y = C x + D u.
 
-    The first twelve states are position [m] in inertial axes, rotation vector [rad] about the body's axes, velocity [m/s] and
-    angular velocity [rad/s] in body axes; they are the outputs. The memory of actuators and of parts of a controller
-    follows.
+    The first twelve states are position [m] in inertial axes, rotation vector [rad] in body axes, and velocity [m/s] and
+    angular velocity [rad/s] in body axes. They are also the outputs. The memory of actuators and of control parts follows.
 
     Attributes:
-        A: (n, n).
-        B: (n, m).
-        C: (12, n).
-        D: (12, m).
+        A: state matrix (n, n).
+        B: input matrix (n, m).
+        C: output matrix (12, n).
+        D: feedthrough matrix (12, m).
         dt: the period [s].
         states: names of the states (n,), such as "velocity[0]", "control_fins.place[1]", "heading_pid.memory[0]".
         inputs: names of the inputs (m,), such as "control_fins[0]", or "X" to "N" of a wrench.
-        about: the motion: position, attitude, velocity and angular_velocity by name, after which the period begins.
-        messages: what the model leaves out of the scene: noise, drift and rounding of sensors, faults.
+        about: the motion at the start of the period: position, attitude, velocity and angular_velocity by name.
+        messages: notes on parts of the scene that the model leaves out: noise, drift and rounding of sensors, faults.
     """
 
     A: np.ndarray
@@ -71,11 +70,11 @@ class LinearModel:
         return np.asarray(values[np.argsort(-np.abs(values))])
 
     def part(self, states: Sequence[str], inputs: Sequence[str] | None = None) -> LinearModel:
-        """The model of some states by themselves, as if the others did not move.
+        """Reduce the model to some states; the others are held at 0.
 
         Args:
             states: names of the states to keep; a whole name, such as "velocity", keeps all of its entries.
-            inputs: names of the inputs to keep; None, the default, for all.
+            inputs: names of the inputs to keep; None, the default, keeps all.
 
         Returns:
             The smaller model.
@@ -92,10 +91,10 @@ class LinearModel:
             states=tuple(self.states[i] for i in keep), inputs=tuple(self.inputs[i] for i in push))  # fmt: skip
 
     def state_space(self) -> Any:
-        """The model for python-control, the extra `control`: its margins, its plots, its designs.
+        """Convert the model for python-control (the extra `control`), with its margins, plots and designs.
 
         Returns:
-            A control.StateSpace with these names, dots in them as underscores.
+            A control.StateSpace with the names of this model; dots become underscores.
 
         Raises:
             MissingExtra: If python-control is not installed.
@@ -111,7 +110,7 @@ class LinearModel:
 
 
 def chosen_places(faults: Faults, key: str, wanted: Sequence[str], known: tuple[str, ...]) -> list[int]:
-    """Places of names, those of whole vectors too."""
+    """Indices of names; the name of a vector stands for all its entries."""
     places: list[int] = []
     for name in wanted:
         entries = [i for i, each in enumerate(known) if each == name or each.startswith(f"{name}[")]
@@ -133,30 +132,30 @@ def linearize(
     h: float | None = None,
     step: float = STEP,
 ) -> LinearModel:
-    """The linear model of one period: of the plant from commands that are held, or of the closed loop.
+    """Linearise one period of the plant with commands that are held, or of the closed loop.
 
-    Central differences of the run's own steps, all in one launch: the model holds the method, the lags of actuators and the
-    hold as they are in a run. Its error is step^2 times a third derivative, and round-off / step: some 1e-10. A closed loop
-    takes noise, drift and rounding of sensors as 0, their mean, and faults as off.
+    The model follows from central differences of the run's own steps, all in one launch. So it includes the method, the
+    lags of actuators and the hold as in a run. Its errors are step^2 times a third derivative, and round-off / step:
+    some 1e-10. In a closed loop, noise, drift and rounding of sensors are set to their mean, 0, and faults are off.
 
     Args:
-        scene: The scene, without waves and noise; of an Ensemble, its scene.
-        about: The motion: what `lw.linear.trim` returns; for a closed loop also the time [s] after which the run has it. None,
-            the default: the start of the scene, with commands of 0; a closed loop after its first period.
-        inputs: "commands" of the actuators, the default; or "wrench": X, Y, Z [N], K, M, N [N m], body axes about its origin,
-            held for a period beside actuators that keep their commands. Of a plant only.
-        closed: Whether the controller is part of the model. Its inputs then are added to the commands. Default False.
-        period: Period of a plant [s]; default that of the controller, else the step.
-        method: As in `lw.solve`; default that of the trim, else of the scene.
-        h: Step [s]; default that of the trim, else of the scene.
+        scene: The scene, without waves and noise; or an Ensemble, whose scene is used.
+        about: The motion: the answer of `lw.linear.trim`; or, for a closed loop, a time [s], for the motion of the run at
+            that time. None, the default: the start of the scene with commands of 0; a closed loop after its first period.
+        inputs: "commands" of the actuators, the default; or "wrench", for a plant only: X, Y, Z [N], K, M, N [N m] in
+            body axes about the body's origin, held for a period, while the actuators keep their commands.
+        closed: True includes the controller in the model; the inputs are then added to its commands. Default False.
+        period: Period of a plant [s]; default the controller's period, else the step.
+        method: As in `lw.solve`; default the method of the trim, else of the scene.
+        h: Step [s]; default the step of the trim, else of the scene.
         step: Increment of the central differences, relative for numbers above 1; default 1e-5.
 
     Returns:
         The model.
 
     Raises:
-        SceneError: If an argument is at fault, a part of the controller acts by chance or at some ticks only, or a member
-            slightly off the motion fails.
+        SceneError: If an argument is at fault, if a part of the controller is random or acts only at some ticks, or if
+            a member slightly off the motion fails.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -243,7 +242,7 @@ def _closed_model(scene: Scene, time: float, method: Any, h: float, step: float)
 
 
 def command_rows(bench: MotionBench, row: int) -> tuple[int, ...]:
-    """Rows of the bus by which a command acts during a period."""
+    """Rows of the bus through which a command acts during a period."""
     bus: Any = bench.bus
     return (bus.acting + row, bus.acting + bus.channels + row) if bus.delayed else (row,)
 
@@ -251,7 +250,8 @@ def command_rows(bench: MotionBench, row: int) -> tuple[int, ...]:
 def loop_rows(bench: MotionBench, memory: Mapping[str, np.ndarray]) -> list[Row]:
     """Memory of a closed loop after a tick.
 
-    What ticks note of themselves is left out, and what was not delivered: only its sign counts, for integrals that wait.
+    Records that ticks make of themselves are left out. So is the demand that was not delivered: only its sign matters,
+    for the anti-windup of integrals.
     """
     bus: Any = bench.bus
     names = [f"{key}.command[{i}]" for key, (_, count) in bus.commands.items() for i in range(count)]
@@ -270,7 +270,7 @@ def loop_rows(bench: MotionBench, memory: Mapping[str, np.ndarray]) -> list[Row]
 
 
 def remembered(bench: MotionBench, memory: Mapping[str, np.ndarray], terms: bool) -> list[Row]:
-    """Memory beside the commands."""
+    """Rows of the memory other than the commands."""
     choice = bench.plan.kernel_choice
     each = (term for term, _ in (choice.laws if terms else choice.parts_of_control) if term.key in memory)
     rows = []
@@ -289,9 +289,9 @@ AS_LINEAR = "of the loop as a linear one: "
 
 
 def of_the_mean(scene: Any, words: Sequence[str] = OF_MEAN_ZERO) -> tuple[Any, tuple[str, ...], tuple[str, ...]]:
-    """A scene whose sensors have none of some errors of mean zero, and whose faults never begin.
+    """A scene without faults, whose sensors lack some errors of mean zero.
 
-    Returns: The scene, the names of the numbers that are 0 in it, and what to say of it.
+    Returns: The scene, the names of the numbers that were set to 0, and a message for the user.
     """
     controller, sensors, zeros = scene.controller, [], list[str]()
     # A filter believes noises that are not 0; linear models refuse it elsewhere.
@@ -312,7 +312,7 @@ def of_the_mean(scene: Any, words: Sequence[str] = OF_MEAN_ZERO) -> tuple[Any, t
 
 
 def check_parts(controller: Any, purpose: str, refused: Collection[str] | None = None) -> None:
-    """Refuse sensors whose numbers `refused` let no motion be steady; None: those no linear model has, all but the bias."""
+    """Refuse sensors with errors in `refused`, which prevent a steady motion; None: all errors except the bias."""
     problem = f"has no linear model of one period, which {purpose} needs"
     if refused:
         problem = f"lets no motion be steady, as {purpose} need it"
@@ -329,7 +329,7 @@ def check_parts(controller: Any, purpose: str, refused: Collection[str] | None =
 
 
 def states_in_use(A: np.ndarray) -> np.ndarray:
-    """States of A (n, n) that something depends on, those of the motion always; the others decay within a tick."""
+    """Indices of the motion's states in A (n, n) and of states on which others depend; the rest decay within a tick."""
     keep = np.arange(len(A))
     while True:
         some = keep[(keep < 12) | np.any(A[np.ix_(keep, keep)] != 0.0, axis=0)]

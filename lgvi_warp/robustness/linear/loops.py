@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Loops of many members at their steady motions: which have one, why others have none, and whether a run settles."""
+"""Loops of many members at their steady motions, and tests by runs of whether they settle."""
 
 from __future__ import annotations
 
@@ -40,10 +40,10 @@ LEAST_TICKS = 30
 
 
 class Study:
-    """Members whose factor and delay are their own; its arguments are those of `margins`.
+    """Members, each with its own factor and delay in the loop; the arguments are those of `margins`.
 
-    Loops are looked at after `begin` steps, and at last after `last`; a run has `ticks` ticks. `components` are those of the
-    loop's demand.
+    Loops are first examined after `begin` steps, and no later than after `last` steps; a run has `ticks` ticks.
+    `components` are the components of the loop's demand.
     """
 
     def __init__(
@@ -71,9 +71,9 @@ class Study:
         self.channels = {key: term.channels for key, term in controller.actuators.items()}
 
     def loops(self, places: np.ndarray) -> tuple[list[Loops], np.ndarray]:
-        """The loops of members (n,) at their steady motions, together those after the same time; why others have none (n,).
+        """The loops of members (n,) at their steady motions, grouped by time; reasons (n,) of members without a loop.
 
-        Those whose motion does not repeat after `about`, or that are at a limit, go on for twice the time, and again.
+        Members whose motion does not repeat after `about`, or that are at a limit, run on for twice the time, and again.
         """
         bench, n, groups = self.bench, len(places), list[Loops]()
         parameters = self.fleet.subset(places).parameters(0, n)
@@ -118,14 +118,14 @@ class Study:
 
 
 def held(controller: Any) -> frozenset[str]:
-    """Quantities that laws follow and a set-point holds: where one runs away beyond a limit of a law, all else may repeat."""
+    """Quantities that a set-point holds; beyond a limit of a law they may drift while all else repeats."""
     guides = {wish: part for part in controller.guidance for wish in part.gives}
     wishes = {wish for law in controller.laws for wish in law.needs if isinstance(guides.get(wish), SetPoint)}
     return frozenset(wishes & {"depth", "heading", "position"} | ({"heading"} if "attitude" in wishes else set()))
 
 
 def _what_repeats(values: Mapping[str, np.ndarray], wishes: Collection[str]) -> np.ndarray:
-    """Quantities that must repeat, of samples (k, m, ...): velocities, rates, down, commands; and what is held."""
+    """Quantities of samples (k, m, ...) that must repeat: velocities, rates, down, commands and the held quantities."""
     place, attitude = values["position"], values["attitude"]
     wished = {"depth": place[..., 2:], "position": place, "heading": attitude[..., :2, 0]}
     always = values["velocity"], values["angular_velocity"], attitude[..., 2, :], values["command"]
@@ -133,17 +133,17 @@ def _what_repeats(values: Mapping[str, np.ndarray], wishes: Collection[str]) -> 
 
 
 def _commands(repeating: np.ndarray, limits: np.ndarray) -> np.ndarray:
-    """The commands (m, channels) of what must repeat."""
+    """The commands (m, channels) among the repeating quantities."""
     return repeating[:, 9 : 9 + limits.shape[1]]
 
 
 def at_limit(command: np.ndarray, limits: np.ndarray) -> np.ndarray:
-    """Mask of commands (m, channels) at their limits: not those that can be nothing but 0."""
+    """Mask of commands (m, channels) at their limits; a limit of 0 does not count."""
     return np.asarray((limits > 0.0) & (np.abs(command) >= limits * (1.0 - AT_LIMIT)))
 
 
 def _apart(repeating: np.ndarray, before: np.ndarray, limits: np.ndarray) -> np.ndarray:
-    """Difference of repeating quantities from before (m, ...); relative for large ones."""
+    """Difference of repeating quantities from the earlier ones (m, ...); relative for large values."""
     size = np.maximum(1.0, np.abs(before))
     of_commands = _commands(size, limits)
     of_commands[:] = np.minimum(of_commands, np.maximum(limits, np.finfo(float).tiny))
@@ -152,9 +152,9 @@ def _apart(repeating: np.ndarray, before: np.ndarray, limits: np.ndarray) -> np.
 
 
 class Loops:
-    """Loops of members (n,) at their steady motions, to be asked whether they settle with other numbers.
+    """Loops of members (n,) at their steady motions; runs test whether they settle with other factors and delays.
 
-    delay: their own, in steps. limits: (n, channels), the largest commands. repeating: as in `_what_repeats`.
+    delay: the loops' own delays, in steps. limits: (n, channels), the largest commands. repeating: as in `_what_repeats`.
     """
 
     def __init__(
@@ -165,18 +165,18 @@ class Loops:
         self.limits, self.motion, self.repeating, self.begin = np.maximum(limits, 1e-12), motion, repeating, begin
 
     def return_to_it(self) -> np.ndarray:
-        """Whether loops as they are come back to their motions (n,), by a run."""
+        """Mask of unchanged loops that return to their motions (n,), by a run."""
         every = np.arange(len(self.places))
         well, last = self._judged(np.ones(len(every)), self.delay, every)
         near = _apart(last, self.repeating, self.limits)[:, : 9 + self.limits.shape[1]] <= TILTS * self.study.tilt
         return np.asarray(well & near.all(axis=1))
 
     def settle(self, factor: np.ndarray, steps: np.ndarray, some: np.ndarray) -> np.ndarray:
-        """Whether loops of some members (m,) settle, by a run, with factors on the demand and delays in steps of their own."""
+        """Mask of the loops of some members (m,) that settle in a run, each with its factor and its delay in steps."""
         return self._judged(factor, steps, some)[0]
 
     def _judged(self, factor: np.ndarray, steps: np.ndarray, some: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Whether loops settle, and what must repeat, after the run."""
+        """Mask of loops that settle, and the repeating quantities at the end of the run."""
         ticks = self.study.ticks
         settled, near, last = self._run(factor, steps, some, ticks)
         again = np.flatnonzero(near)
@@ -187,7 +187,7 @@ class Loops:
     def _run(
         self, factor: np.ndarray, steps: np.ndarray, some: np.ndarray, ticks: int
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Whether loops settle in so many ticks, whether a longer run may tell more, and what must repeat, at the end."""
+        """Masks of loops that settle in `ticks` and that need a longer run, and the repeating quantities at the end."""
         bench, tilt, limits, m = self.study.bench, self.study.tilt, self.limits[some], len(some)
         k0, k1 = self.begin, self.begin + ticks * bench.every
         by = np.zeros((m, 12))
@@ -222,16 +222,16 @@ class Loops:
 
 
 def _aside(attitude: np.ndarray, begun: np.ndarray, heading: bool) -> np.ndarray:
-    """Angles of the vertical, and of the heading where it is held, from where they began (k, m) [rad]."""
+    """Angles of the vertical, and of the heading if it is held, from their initial directions (k, m) [rad]."""
     apart = np.abs(attitude - begun)
     down = apart[..., 2, :].max(axis=-1)
     return np.maximum(down, apart[..., :2, 0].max(axis=-1)) if heading else down
 
 
 def shrinks(swing: np.ndarray, tilt: float) -> tuple[np.ndarray, np.ndarray]:
-    """Whether what swings settles (m,), and whether a longer run tells more: near the edge, or where slower modes are left.
+    """Masks (m,) of swings that settle, and of those that need a longer run: near the edge, or with slower modes left.
 
-    swing: (3, m), how far in each third of a run that began aside by a tilt [rad].
+    swing: (3, m), range of the signal in each third of a run that began turned by a tilt [rad].
     """
     first, second, last = swing
     still = last <= SETTLED * tilt

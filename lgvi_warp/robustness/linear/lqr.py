@@ -23,10 +23,10 @@ class Regulator:
     """The linear quadratic regulator u = -K x of a model.
 
     Attributes:
-        K: the gains (m, n), of each state for each input.
-        P: (n, n), the least cost from x is x^T P x: the sum over ticks of x^T Q x + u^T R u.
+        K: the gains (m, n), from each state to each input.
+        P: (n, n); x^T P x is the minimal cost from x, the sum over ticks of x^T Q x + u^T R u.
         poles: eigenvalues of A - B K (n,), the largest first.
-        model: the model.
+        model: the linear model.
     """
 
     K: np.ndarray
@@ -35,16 +35,16 @@ class Regulator:
     model: LinearModel
 
     def law(self, name: str = "") -> StateFeedback:
-        """The gains as a law of a controller.
+        """Convert the gains to a law of a controller.
 
         Args:
-            name: Name of the part; by default its type.
+            name: Name of the law in the controller; by default its type.
 
         Returns:
-            The law, whose error has the velocity that is wanted in the wanted body's axes, as the model's has not.
+            The law, with attitude gains corrected for its velocity error nu - R^T v_d, unlike the model's deviation of nu.
 
         Raises:
-            SceneError: If inputs are no components of a wrench, or states no coordinates of the motion.
+            SceneError: If an input is not a component of a wrench, or a state is not a coordinate of the motion.
         """
         faults, model = Faults(), self.model
         for key, names, known in (("inputs", model.inputs, COMPONENTS), ("states", model.states, COORDINATES)):
@@ -67,15 +67,15 @@ def lqr(model: LinearModel, Q: Any, R: Any) -> Regulator:
     """Design a linear quadratic regulator: gains that minimise the sum over ticks of x^T Q x + u^T R u.
 
     Args:
-        model: The linear model, as in `lw.linear.linearize` with inputs="wrench" for `lw.control.StateFeedback`.
-        Q: Weights of the states, (n, n), or (n,) of its diagonal, >= 0.
-        R: Weights of the inputs, (m, m), or (m,) of its diagonal, > 0.
+        model: The linear model, as from `lw.linear.linearize`; for `lw.control.StateFeedback` with inputs="wrench".
+        Q: Weights of the states: a matrix (n, n) or its diagonal (n,), >= 0.
+        R: Weights of the inputs: a matrix (m, m) or its diagonal (m,), > 0.
 
     Returns:
         The gains, the matrix of the cost, and the poles of the closed loop.
 
     Raises:
-        SceneError: If a matrix is at fault, or no gains hold every state: the message names the poles that none moves.
+        SceneError: If a matrix is at fault, or no gains stabilise every state; the message names the poles at fault.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -103,7 +103,7 @@ def lqr(model: LinearModel, Q: Any, R: Any) -> Regulator:
 
 
 def _weights(faults: Faults, key: str, value: Any, size: int, least: float) -> np.ndarray:
-    """A symmetric matrix of weights."""
+    """Read a symmetric matrix of weights."""
     shape = f"give ({size}, {size}), or ({size},) of its diagonal"
     array = faults.real(key, value, shape)
     if array is None:
@@ -118,7 +118,7 @@ def _weights(faults: Faults, key: str, value: Any, size: int, least: float) -> n
 
 
 def _not_held(model: LinearModel) -> SceneError:
-    """The refusal of a model, with the poles that no gain moves (Hautus): the rows of [A - z, B] are dependent there."""
+    """Error for a model with poles z that no gain moves (Hautus): the rows of [A - z, B] are linearly dependent."""
     n = len(model.A)
     stuck = [
         z for z in model.poles if abs(z) >= 1.0 - 1e-9

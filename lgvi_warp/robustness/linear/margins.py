@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`margins`: how much gain, delay and phase the loop of each member bears, by eigenvalues and by runs in lanes."""
+"""`margins`: gain, delay, phase and disk margins of each member's loop, by eigenvalues and by runs."""
 
 from __future__ import annotations
 
@@ -59,12 +59,12 @@ WORD_OF = {name: word for word, each in NAMES.items() for name in each} | {
 
 
 def unit_of(name: str) -> str:
-    """The unit of a margin; "" for a number."""
+    """The unit of a margin; "" if it has none."""
     return UNITS.get(name, UNITS.get(name.rsplit("_", 1)[-1], ""))
 
 
 def _named(key: str, name: str, columns: Mapping[str, Any]) -> Any:
-    """Column of a name that the user gave."""
+    """Column with the name that the user gave."""
     if not among(name, columns):
         raise refusal(key, name, "is not known", closest(name, columns))
     return columns[name]
@@ -82,24 +82,25 @@ def _percentages(of: Any) -> np.ndarray:
 class Margins(Saved):
     """Margins of a loop by member.
 
-    Each is NaN for a member whose unchanged loop does not settle; `why` has the reason.
+    The margins of a member are NaN if its unchanged loop does not settle; `why` has the reason.
 
     Attributes:
         loop: key of the law; "all laws" for the whole controller.
-        values: by name, (n,): "gain_lower" and "gain_upper", the bounds of the factors on the demand that the loop
-            tolerates (0 and infinite if it tolerates all that were tried); "delay", the largest delay [s] beside the loop's
-            own, in whole steps; "phase", the phase margin [rad], and the crossover where it is least ("phase_frequency"
-            [rad/s]): infinite, at a frequency of NaN, if no gain of the loop crosses 1; "disk", the disk margin of all
-            components of the demand at once, the factors ("disk_gain_lower", "disk_gain_upper") and phases ("disk_phase"
-            [rad]) that it guarantees, and its frequency ("disk_frequency" [rad/s]); peak gains, "sensitivity_peak",
-            "complementary_peak" and "position[2]_peak" of what was asked `to`, and where ("..._frequency" [rad/s]).
-        by_runs: the same by runs, if they were requested.
-        why: (n,), reason why a member has no margins: "does not settle", "at its limit: thrusters[3]" where a motion stays
-            there, "moves nothing" where its commands have no effect, "failed"; "" if it has margins.
-        step: step of the runs [s], to which delays are known.
-        messages: what the user should know, such as that the step was shortened to fit the period.
+        values: margins by name, each (n,). "gain_lower" and "gain_upper": bounds of the factors on the demand that the
+            loop tolerates; 0 and infinite if it tolerates all that were tried. "delay": the largest tolerated delay [s]
+            in addition to the loop's own, in whole steps. "phase": the phase margin [rad], with the crossover frequency
+            at which it is smallest ("phase_frequency" [rad/s]); infinite, at a frequency of NaN, if no gain of the loop
+            crosses 1. "disk": the disk margin of all components of the demand at once, with the factors
+            ("disk_gain_lower", "disk_gain_upper") and phases ("disk_phase" [rad]) that it guarantees, and its frequency
+            ("disk_frequency" [rad/s]). "sensitivity_peak", "complementary_peak" and, for the numbers in `to`, such as
+            "position[2]_peak": peak gains, with their frequencies ("..._frequency" [rad/s]).
+        by_runs: the same margins computed by runs, if requested.
+        why: (n,), reason why a member has no margins: "does not settle", "at its limit: thrusters[3]" if the command
+            stays there, "moves nothing" if the commands have no effect, or "failed"; "" if it has margins.
+        step: step of the runs [s]; delays are multiples of it.
+        messages: notes for the user, such as that the step was shortened to fit the period.
         members: number of members, n.
-        steady: whether the loop settles as it is, (n,).
+        steady: True for members whose unchanged loop settles, (n,).
         reasons: number of members without margins, by reason.
 
     Methods:
@@ -119,7 +120,7 @@ class Margins(Saved):
 
     @property
     def steady(self) -> np.ndarray:
-        """Whether the loop settles as it is, (n,)."""
+        """Mask of the members whose unchanged loop settles, (n,)."""
         return np.asarray(self.why == "")
 
     @property
@@ -161,13 +162,13 @@ class Margins(Saved):
             yield {"member": member, "why": why, **columns}
 
     def percentiles(self, of: Sequence[float] = PERCENTILES) -> dict[str, np.ndarray]:
-        """Find how margins are distributed over the members that settle as they are.
+        """Compute percentiles of the margins over the members whose unchanged loop settles.
 
         Args:
             of: percentages (k,), in [0, 100].
 
         Returns:
-            By name, (k,): each the margin of a member; NaN where no member has one.
+            Percentiles of each margin, name -> (k,). Each is the margin of a member; NaN if no member has margins.
         """
         quantiles = _percentages(of) / 100.0
         known = {name: v[~np.isnan(v)] for name, v in self._columns().items()}
@@ -177,14 +178,14 @@ class Margins(Saved):
         }
 
     def curve(self, name: str, by: str | None = None) -> tuple[np.ndarray, np.ndarray]:
-        """Find the distribution of a margin for a picture: how many members have less.
+        """Compute the cumulative distribution of a margin over the members, for a plot.
 
         Args:
             name: "gain_lower", "gain_upper", "delay", "disk" or another of `values`.
-            by: "eigenvalues" or "runs"; None, the default, for the first of them that was asked.
+            by: "eigenvalues" or "runs"; None, the default, takes the first of them that was computed.
 
         Returns:
-            (margins of the members that settle as they are, rising; the part of them with at most that much).
+            (rising margins of members whose unchanged loop settles; fraction of these with at most this margin).
         """
         ways = dict(zip(WAYS, (self.values, self.by_runs), strict=True))
         columns = self._columns() if by is None else _named("by", by, ways)
@@ -192,15 +193,15 @@ class Margins(Saved):
         return values, np.arange(1, len(values) + 1) / max(1, len(values))
 
     def worst(self, count: int = 10, name: str | None = None) -> np.ndarray:
-        """Find the members that bear least.
+        """Find the members with the smallest margins.
 
         Args:
-            count: how many (default 10).
-            name: by which margin; None, the default, for the first of "gain_upper", "delay", "phase", "disk" and
-                "sensitivity_peak" that was asked. Of a peak the largest is the worst.
+            count: number of members (default 10).
+            name: name of the margin; None, the default, takes the first of "gain_upper", "delay", "phase", "disk" and
+                "sensitivity_peak" that was computed. For peaks, the largest is the worst.
 
         Returns:
-            Indices (count,), the least first; members that do not settle as they are before all others.
+            Indices (count,), the worst first; members whose unchanged loop does not settle come before all others.
         """
         columns = self._columns()
         chosen = name or next(word for word in ("gain_upper", *NAMED, "sensitivity_peak") if word in columns)
@@ -209,7 +210,7 @@ class Margins(Saved):
 
     @property
     def reasons_text(self) -> str:
-        """The reasons in words, the most frequent first."""
+        """Text of the reasons, the most frequent first."""
         return "; ".join(f"{count:,}: {why}" for why, count in self.reasons.items())
 
     def _columns(self) -> Mapping[str, np.ndarray]:
@@ -271,54 +272,58 @@ def margins(
 ) -> Margins:
     """Compute the gain, delay and phase margins of each member's loop.
 
-    A member's loop is examined about its motion after `about` seconds. The motion must be steady: velocities, rates, the
-    vertical, the commands, and what a law holds at a set-point are the same to 1e-6 a period later, and no command is at
-    its limit. Otherwise the member runs on for twice the time, and again, up to `settle`. It is then turned aside, and must
-    return in a run. If one of these conditions fails, the member has no margins, and `why` names the condition.
+    A member's loop is examined about its motion after `about` seconds. This motion must be steady: one period later,
+    velocities, rates, the vertical, the commands and quantities held at a set-point are the same to 1e-6, and no
+    command is at its limit. Otherwise the member runs on for twice the time, and again, up to `settle`. The member is
+    then turned by `tilt`, and must return to the motion in a run. If one of these conditions fails, the member has no
+    margins, and `why` names the condition.
 
-    By eigenvalues: those of the sampled loop about that motion. It is affine in the factor on the law's demand, and each
-    delay within a period is linearised, so bisection needs no runs. Neutral modes that no law observes do not count.
+    By eigenvalues: margins follow from the eigenvalues of the linearised sampled loop about that motion. The loop is
+    affine in the factor on the law's demand, and each delay within a period is linearised, so bisection needs no runs.
+    Neutral modes that no law observes do not count.
 
-    By runs: every member runs with its own factor or delay, and each run divides all brackets at once. The runs start from
-    the same motion, turned by `tilt`. A loop settles if the swing of its rates and commands shrinks from the second to the
-    last third of the run, and is less than in the first third. Also, in the last third no command is at its limit, and the
-    body is aside by less than 10 tilts and turns by less within a period. If the swing shrinks by little, a run of 1.5
-    times the length is examined, too. The error is not examined: a slow integral hides a small fast limit cycle in it. If
-    stability changes more than once, the margin is at one of the changes.
+    By runs: every member runs with its own factor or delay, and each run bisects the brackets of all members. The runs
+    start from the same motion, turned by `tilt`. A loop settles if two conditions hold. The swing of its rates and commands
+    shrinks from the second to the last third of the run, and is smaller than in the first third. In the last third no
+    command is at its limit, and the body is off the motion by less than 10 tilts and turns by less within a period. If the
+    swing shrinks only slightly, a run of 1.5 times the length is examined, too. The tracking error is not examined: a slow
+    integral hides a small fast limit cycle in it. If stability changes repeatedly, the margin is at one of the changes.
 
-    Noise and drift of sensors are taken as 0, their mean, and faults as off; by eigenvalues rounding, too: see `messages`.
+    Noise and drift of sensors are set to 0, their mean, and faults are off; by eigenvalues, so is rounding: see `messages`.
 
-    The phase margin is the least phase, lag or lead, applied to all components of the law's demand at once, at which the
-    loop becomes unstable: with one component that at the crossovers of its gain, with several at those of the
-    characteristic loci of the sampled loop (MacFarlane, Postlethwaite 1977, Int. J. Control 25(1)). It is infinite where no
-    gain crosses 1 between 1e-5 of the Nyquist frequency and that.
+    The phase margin is the smallest phase, lag or lead, at which the loop becomes unstable if it is applied to all
+    components of the law's demand at once. For one component it follows from the crossovers of the gain; for several,
+    from the crossovers of the characteristic loci of the sampled loop (MacFarlane, Postlethwaite 1977, Int. J. Control
+    25(1)). It is infinite if no gain crosses 1 between 1e-5 of the Nyquist frequency and the Nyquist frequency.
 
-    The disk margin is that of the sampled loop, opened at all components of the law's demand: at any frequency each may have
-    a complex factor of its own in the disk (1 + (1 - skew) d / 2) / (1 - (1 + skew) d / 2), |d| < margin (Seiler, Packard,
-    Gahinet 2020, IEEE Control Systems 40(5)). It is 1 / the largest structured singular value of S + (skew - 1) / 2.
+    The disk margin is computed for the sampled loop, opened at all components of the law's demand. The loop remains
+    stable if each component has its own complex factor, at any frequency, in the disk (1 + (1 - skew) d / 2) / (1 - (1
+    + skew) d / 2), |d| < margin (Seiler, Packard, Gahinet 2020, IEEE Control Systems 40(5)). The margin is 1 / (largest
+    structured singular value of S + (skew - 1) / 2).
 
-    A peak gain is the largest gain, over frequency, from a disturbance that is added to the law's demand: to the demand
-    that acts (S, the sensitivity), to the law's answer (T), and to each number of the motion in `to`, per unit of the
-    demand; with several components the largest singular value, so it is the H-infinity norm. It is infinite where the gain
-    grows towards frequency 0. The largest of the members is the worst-case gain of the ensemble.
+    A peak gain is the largest gain over frequency from a disturbance that is added to the law's demand. Its outputs are the
+    demand that acts (S, the sensitivity), the law's response (T), and each number of the motion in `to`, per unit of the
+    demand. With several components the gain is the largest singular value, so the peak is the H-infinity norm. It is
+    infinite if the gain grows towards frequency 0. The largest peak of all members is the worst-case gain of the ensemble.
 
     Args:
         fleet: An Ensemble, or a Scene whose [ensemble] is used; without waves and noise.
         loop: Key of the law, such as "heading_pid"; None, the default, for all laws together.
-        of: Some of "gain", "delay", "phase", "disk" and "peak"; the first two by default. A delay is that of all commands;
-            "phase", "disk" and "peak" are by eigenvalues only.
+        of: Some of "gain", "delay", "phase", "disk" and "peak"; the first two by default. "delay" delays all commands;
+            "phase", "disk" and "peak" are computed by eigenvalues only.
         by: "eigenvalues", the default, "runs", or both.
         about: Time at which the loop is examined [s]; 60 by default.
         settle: Longest time until a member must be steady [s]; 1200 by default.
         seconds: Length of the runs [s]; 240 by default.
-        tilt: Angle by which runs start turned about each axis of the body [rad]; 0.001 by default.
-        most: Largest factor that is tried, and the inverse of the least one; 100 by default.
+        tilt: Angle by which the start of a run is turned about each axis of the body [rad]; 0.001 by default.
+        most: Largest factor that is tried; the smallest factor is 1 / most. 100 by default.
         longest: Longest delay that is added [s]; 10 by default.
-        skew: Skew of the disk, from -1 to 1: 0, the default, for factors and their inverses alike; 1 for the sensitivity S.
-        to: Numbers of the motion whose peak gains are wanted too, as "position[2]" [m], "rotation[1]" [rad, body axes],
-            "velocity" [m/s], "angular_velocity" [rad/s], as in `linearize`; none by default.
-        method: As in `lw.solve`; default that of the scene.
-        h: Step [s]; default that of the scene.
+        skew: Skew of the disk, from -1 to 1. 0, the default: the disk contains the inverse of each of its factors; 1:
+            the margin follows from the sensitivity S alone.
+        to: Numbers of the motion that get a peak gain too, such as "position[2]" [m], "rotation[1]" [rad, body axes],
+            "velocity" [m/s] or "angular_velocity" [rad/s], as in `linearize`; none by default.
+        method: As in `lw.solve`; default the scene's method.
+        h: Step [s]; default the scene's step.
 
     Returns:
         The margins of each member.
@@ -386,7 +391,7 @@ def margins(
 
 
 def _check_loop(faults: Faults, controller: Any, loop: str | None, seconds: float) -> None:
-    """Check that a controller has the law, and enough ticks in a run."""
+    """Check that a controller has the law, and that a run has enough ticks."""
     if controller is None:
         faults.add("controller", None, "is not in the scene, and margins are those of a loop", "give [controller]")
     elif loop is not None and loop not in (keys := [law.key for law in controller.laws]):
@@ -399,7 +404,7 @@ def _check_loop(faults: Faults, controller: Any, loop: str | None, seconds: floa
 
 
 def _outputs(faults: Faults, to: Any, of: Sequence[str]) -> dict[str, int]:
-    """Places in the motion of the numbers that peaks are asked to, by name."""
+    """Indices in the motion of the numbers in `to`, by name."""
     places = chosen_places(faults, "to", listed("to", to, "names"), COORDINATES)
     if places and "peak" not in of:
         faults.add("to", to, "is asked without peaks", 'add "peak" to `of`')
@@ -419,7 +424,7 @@ def _group(
     skew: float,
     outputs: Mapping[str, int],
 ) -> tuple[np.ndarray, Answers]:
-    """Why loops have no margins (n,), and margins by way and by name."""
+    """Reasons why loops have no margins (n,), and margins, by eigenvalues and by runs, by name."""
     bench, n, delays_now = loops.study.bench, len(loops.places), loops.delay
     every, unity, h = np.arange(n), np.ones(n), bench.plan.grid.h
     last = np.minimum(round(longest / h), (MOST_PERIODS - 1) * bench.every - delays_now)
@@ -466,7 +471,7 @@ def _of_frequencies(
     sampled: SampledLoop, delays: np.ndarray, settled: np.ndarray, of: Sequence[str], skew: float, period: float,
     outputs: Mapping[str, int],
 ) -> dict[str, np.ndarray]:  # fmt: skip
-    """Disk margins and peak gains by name (n,) of loops with delays in steps; NaN where they do not settle."""
+    """Phase margins, disk margins and peak gains, name -> (n,); delays in steps; NaN for loops that do not settle."""
     values: dict[str, np.ndarray] = {}
     for opened in sampled.opened(delays, np.flatnonzero(settled)):
         found = phases(sampled.observed(opened), period) if "phase" in of else {}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`loop`: the open loop of each member, at the demand of a law or at commands, with hold, lag and delay as in the run."""
+"""`loop`: open loop of each member at a law's demand or at commands; hold, lags and delay are as in the run."""
 
 from __future__ import annotations
 
@@ -34,17 +34,17 @@ Matrices = tuple[np.ndarray, np.ndarray, np.ndarray]
 @explained
 @dataclass(frozen=True, repr=False)
 class OpenLoops:
-    """Open loops of members: x' = A x + B u after a tick, y = C x; u = -y closes them.
+    """Open loops of members: x' = A x + B u after one tick, y = C x; the feedback u = -y closes them.
 
-    States are linear combinations of the loop's states, without those that no law observes.
+    The states x are linear combinations of the loop's states; states that no law observes are left out.
 
     Attributes:
-        at: input at which they are opened.
+        at: input at which the loops are opened.
         models: (A, B, C) of each member, (k, k), (k, r) and (r, k); None for a member without a loop.
         names: names of the inputs u and outputs y (r,): components of a demand, or commands.
         dt: the period [s].
         why: (n,), reason why a member has no loop, as in `lw.linear.margins`; "" if it has one.
-        messages: what the user should know, such as what linear loops leave out.
+        messages: notes for the user, such as effects that linear loops leave out.
         members: number of members, n.
     """
 
@@ -68,10 +68,10 @@ class OpenLoops:
         return "\n".join([*self.messages, f"The loop is opened at {self.at}{inputs} in {some}."])
 
     def frequencies(self) -> np.ndarray:
-        """Find the frequencies at which all loops are seen: a grid, and the angles of their poles.
+        """Choose frequencies at which all loops are evaluated: a grid, and the frequencies of their poles.
 
         Returns:
-            (k,), rising to the Nyquist frequency [rad/s].
+            Frequencies (k,), rising to the Nyquist frequency [rad/s].
         """
         each = [grid_of(_response(model)) for model in self.models if model is not None]
         return np.unique(np.concatenate([np.zeros(0), *each])) / self.dt
@@ -80,10 +80,10 @@ class OpenLoops:
         """Compute the frequency responses L(e^(i w dt)).
 
         Args:
-            frequencies: w (k,) [rad/s].
+            frequencies: frequencies w (k,) [rad/s].
 
         Returns:
-            (n, k, r, r), complex; NaN for members without a loop, and where one has a pole.
+            Complex responses (n, k, r, r); NaN for members without a loop, and at a pole.
         """
         angles, r = np.asarray(frequencies, float) * self.dt, len(self.names)
         found = np.full((self.members, len(angles), r, r), np.nan, complex)
@@ -94,13 +94,13 @@ class OpenLoops:
         return np.where(np.isfinite(found), found, np.nan)
 
     def loci(self, frequencies: Any) -> np.ndarray:
-        """Compute the characteristic loci, the eigenvalues of L; of one input L itself.
+        """Compute the characteristic loci, the eigenvalues of L; with one input, they are L itself.
 
         Args:
-            frequencies: w (k,) [rad/s].
+            frequencies: frequencies w (k,) [rad/s].
 
         Returns:
-            (n, k, r), the largest first; NaN as in `response`.
+            Eigenvalues (n, k, r), the largest first; NaN as in `response`.
         """
         L = self.response(frequencies)
         lost = np.isnan(L).any(axis=(2, 3))
@@ -108,7 +108,7 @@ class OpenLoops:
         return np.where(lost[..., None], np.nan, values)
 
     def state_space(self, member: int = 0) -> Any:
-        """The loop of a member for python-control, the extra `control`.
+        """Convert the loop of a member for python-control (the extra `control`).
 
         Args:
             member: index of the member; 0 by default.
@@ -126,11 +126,11 @@ class OpenLoops:
         )
 
     def frd(self, member: int = 0, frequencies: Any = None) -> Any:
-        """The frequency response of a member for python-control, the extra `control`.
+        """Convert the frequency response of a member for python-control (the extra `control`).
 
         Args:
             member: index of the member; 0 by default.
-            frequencies: w (k,) [rad/s]; None, the default, for those of `frequencies()`.
+            frequencies: frequencies w (k,) [rad/s]; None, the default, takes `frequencies()`.
 
         Returns:
             A control.FRD with the period as its dt.
@@ -153,7 +153,7 @@ class OpenLoops:
         return model
 
     def _signals(self, letter: str) -> list[str]:
-        """Names of signals, of which python-control allows none twice and no dots."""
+        """Names of signals for python-control, which allows neither duplicates nor dots."""
         return [f"{letter}_{name}".replace(".", "_") for name in self.names]
 
 
@@ -180,23 +180,23 @@ def loop(
     method: str | Method | None = None,
     h: float | None = None,
 ) -> OpenLoops:
-    """Open the loop of each member at an input, and give it as a linear model of a period.
+    """Open the loop of each member at an input, and return it as a linear model of one period.
 
-    The loop is that of `margins`, about the motion of a member after `about` seconds, which must be steady. The closed loop
-    need not be stable. Loops that are not opened stay closed.
+    The loop is the same as in `margins`: it is linearised about the member's motion after `about` seconds, which must
+    be steady. The closed loop need not be stable. All other loops stay closed.
 
     Args:
         fleet: An Ensemble, or a Scene whose [ensemble] is used; without waves and noise of the water.
-        at: Input: key of a law, such as "heading_pid", for all components of its demand; a component of the demand of all
-            laws, "X" to "N"; a command, "control_fins[0]", or all those of an actuator, "control_fins". None, the default, for
-            the whole demand of all laws.
+        at: Input at which the loop is opened: key of a law, such as "heading_pid", for all components of its demand; "X" to
+            "N" for a component of the demand of all laws; a command, such as "control_fins[0]"; or an actuator, such as
+            "control_fins", for all of its commands. None, the default, opens it at the whole demand of all laws.
         about: Time at which the loop is examined [s]; 60 by default.
         settle: Longest time until a member must be steady [s]; 1200 by default.
-        method: As in `lw.solve`; default that of the scene.
-        h: Step [s]; default that of the scene.
+        method: As in `lw.solve`; default the scene's method.
+        h: Step [s]; default the scene's step.
 
     Returns:
-        The loops.
+        The open loops.
 
     Raises:
         SceneError: If an argument or the scene is at fault.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Peak gains of sampled loops: how much of a disturbance of the demand comes through at the frequency where most does."""
+"""Peak gains of sampled loops from a disturbance of the demand: the largest gain over frequency."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ OF_THE_DEMAND = ("sensitivity", "complementary")
 
 
 def gains_of(response: Response, outputs: np.ndarray) -> list[Callable[[np.ndarray], np.ndarray]]:
-    """Functions of angles (k,) that give matrices (k, p, r): S, T, and of each output from a disturbance of the demand.
+    """Functions from angles (k,) to matrices (k, p, r): S, T, and the gain from a demand's disturbance to each output.
 
-    outputs: rows (p, n) of the states that are asked for, one function each.
+    outputs: rows (p, n) of the requested states; each has one function.
     """
 
     def closed(angles: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -47,7 +47,7 @@ def gains_of(response: Response, outputs: np.ndarray) -> list[Callable[[np.ndarr
 
 
 def highest(matrices: Callable[[np.ndarray], np.ndarray], angles: np.ndarray) -> tuple[float, float]:
-    """The largest singular value over frequencies, and its angle [rad a period]; infinite, at 0, where it grows towards 0."""
+    """The largest singular value over frequency, and its angle [rad per period]; inf, at 0, if it grows towards 0."""
 
     def norms(at: np.ndarray) -> np.ndarray:
         with np.errstate(all="ignore"):
@@ -70,9 +70,9 @@ def highest(matrices: Callable[[np.ndarray], np.ndarray], angles: np.ndarray) ->
 
 
 def peaks(opened: Opened, places: Sequence[int], names: Sequence[str], period: float) -> dict[str, np.ndarray]:
-    """Peak gains and their frequencies [rad/s] by name (m,) of loops that settle.
+    """Peak gains and their frequencies [rad/s] of loops that settle, name -> (m,).
 
-    places: of states of the motion that are asked for as well; names: theirs.
+    places: indices of further states of the motion that are outputs; names: names of these states.
     """
     each = []
     for A, B, C in zip(opened.A, opened.B, opened.C, strict=True):

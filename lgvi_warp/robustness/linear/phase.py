@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Phase margins of sampled loops: the phase that a whole demand bears at once, at the frequencies where its gain crosses 1.
+"""Phase margins of sampled loops: tolerated phase shift of a whole demand, at the frequencies where its gain crosses 1.
 
 With several components the gains are those of the characteristic loci (MacFarlane, Postlethwaite 1977, Int. J. Control 25(1)).
 """
@@ -19,15 +19,15 @@ MISS = 1e-6
 
 
 def loci(L: np.ndarray) -> np.ndarray:
-    """Eigenvalues (k, r) of L (k, r, r), the largest first: by size each is continuous in the frequency."""
+    """Eigenvalues (k, r) of L (k, r, r), the largest first: sorted by size, each is continuous in frequency."""
     values = np.linalg.eigvals(L) if L.shape[1] > 1 else L[:, 0]
     return np.asarray(np.take_along_axis(values, np.argsort(-np.abs(values), axis=1), axis=1))
 
 
 def phase(response: Response) -> tuple[float, float]:
-    """The least phase [rad], lag or lead, on a demand that ends a stable loop, and where [rad a period].
+    """The smallest phase [rad], lag or lead, on a demand that makes the loop unstable, and its angle [rad per period].
 
-    It is infinite, at NaN, where no gain crosses 1.
+    The phase is infinite, and its angle NaN, if no gain crosses 1.
     """
 
     def sizes(angles: np.ndarray) -> np.ndarray:
@@ -74,6 +74,6 @@ def phase(response: Response) -> tuple[float, float]:
 
 
 def phases(models: Iterable[tuple[np.ndarray, np.ndarray, np.ndarray]], period: float) -> dict[str, np.ndarray]:
-    """Phase margins and their frequencies [rad/s] by name (m,) of opened loops that settle."""
+    """Phase margins and their frequencies [rad/s] of opened loops that settle, name -> (m,)."""
     found = np.array([phase(Response(*model)) for model in models]).reshape(-1, 2)
     return {"phase": found[:, 0], "phase_frequency": found[:, 1] / period}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The linearised closed loops of many members: for any factor on the demand and any delay, from a few launches."""
+"""The linearised closed loops of many members, for any factor on the demand and any delay, from a few launches."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ NEUTRAL = 1e-3
 
 
 def delayed(bench: MotionBench, motion: Motion, k: int, steps: np.ndarray) -> Motion:
-    """The motions as after a tick at a steady motion, with delays (m,) in steps."""
+    """The motions after a tick at a steady motion, with delays (m,) in steps."""
     bus: Any = bench.bus
     memory = motion.copied_memory()
     of_bus, count = memory[""], bus.channels
@@ -38,7 +38,7 @@ def delayed(bench: MotionBench, motion: Motion, k: int, steps: np.ndarray) -> Mo
 
 
 class Opened(NamedTuple):
-    """Loops that are opened at their demands: x' = A x + B w of some members, whose laws demand w = C x at the tick.
+    """Loops of some members, opened at their demands: x' = A x + B w; the laws demand w = C x at the tick.
 
     some: (m,), A: (m, n, n), B: (m, n, r), C: (m, r, n).
     """
@@ -49,17 +49,18 @@ class Opened(NamedTuple):
     C: np.ndarray
 
     def at(self, component: int) -> Opened:
-        """The same, opened at one of the components of the demand: the others are closed."""
+        """The same loops, opened only at one component of the demand; the others are closed."""
         others = np.arange(self.B.shape[2]) != component
         A = self.A + self.B[:, :, others] @ self.C[:, others]
         return Opened(self.some, A, self.B[:, :, ~others], self.C[:, ~others])
 
 
 class SampledLoop:
-    """x' = P x + Q1 u of q ticks ago + Q0 u of the tick before that; u' and what parts remember follow from x' at the tick.
+    """Loops x' = P x + Q1 u(q ticks ago) + Q0 u(one tick earlier); the tick computes u' and the parts' memory from x'.
 
-    u' is affine in the factor. P, Q1, Q0 for each delay within a period, and what the tick does, are differences in lanes.
-    Its `moves` (n,) is whether the demand of the loop moves anything. apart: components of the demand at which it is opened.
+    u' is affine in the factor. P, Q1 and Q0 for each delay within a period, and the derivatives of the tick, are
+    central differences in lanes. The attribute `moves` (n,) is True if the demand of the loop has any effect. apart:
+    components of the demand at which the loop is opened.
     """
 
     def __init__(self, bench: MotionBench, places: np.ndarray, motion: Motion, k: int, apart: Sequence[int] = ()):
@@ -76,7 +77,7 @@ class SampledLoop:
         of_period = Differences(bench, k, bench.every, [*terms, *acting, *parts], [*terms, *commands, *parts])
 
         def tick(factors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            """The derivatives of a period, and of what the tick does, with factors (6,) on the demand."""
+            """The derivatives of a period and of the tick, with factors (6,) on the demand."""
             numbers = {FACTOR: np.tile(factors, (n, 1)), DELAY: zero}
             derivatives = self._without_failed(of_period(places, still, numbers))
             # A tick sees the motion alone: what it does of x is found behind the period that was between.
@@ -113,9 +114,9 @@ class SampledLoop:
         self._axes, self._ranks = self._decomposed()
 
     def _decomposed(self) -> tuple[np.ndarray, np.ndarray]:
-        """Axes of motion and parts (n, s + m, s + m), those first that laws see, by singular values; and how many they see.
+        """Axes of motion and parts (n, s + m, s + m), those that laws observe first, and the number of these.
 
-        What they do not see acts on nothing that they do see: with any factor and delay it goes its own way.
+        States that laws do not observe have no effect on observed ones, so they evolve independently of factor and delay.
         """
         s, m, C = self._s, self._m, self._C
         size = s + m
@@ -145,15 +146,15 @@ class SampledLoop:
         return axes, ranks
 
     def _without_failed(self, derivatives: np.ndarray) -> np.ndarray:
-        """The same, with other numbers for members of which a copy failed: their loops do not settle."""
+        """The derivatives, with finite substitutes for members of which a copy failed: their loops do not settle."""
         well = np.isfinite(derivatives).all(axis=(1, 2))
         self._bounded &= well
         return np.where(well[:, None, None], derivatives, np.eye(*derivatives.shape[1:]))
 
     def stable(self, factor: np.ndarray, steps: np.ndarray, some: np.ndarray) -> np.ndarray:
-        """Whether loops of some members (m,) settle, with factors on the demand and delays in steps of their own.
+        """Mask of the loops of some members (m,) that settle, with their factors on the demand and delays in steps.
 
-        All eigenvalues of what laws see are within the unit circle then, and what they do not see does not grow.
+        A loop settles if all eigenvalues of the observed states are within the unit circle, and the others do not grow.
         """
         answer = np.zeros(len(some), bool)
         for q in np.unique(steps // self.every):
@@ -167,7 +168,7 @@ class SampledLoop:
         return answer & self._bounded[some]
 
     def opened(self, steps: np.ndarray, places: np.ndarray) -> Iterator[Opened]:
-        """Some loops (m,), opened at the components of their demand; those of one delay, in steps (n,), together."""
+        """Some loops (m,), opened at the components of their demand, grouped by delay; steps: delays (n,)."""
         s, m, C = self._s, self._m, self._C
         for q in np.unique(steps[places] // self.every):
             some = places[steps[places] // self.every == q]
@@ -187,7 +188,7 @@ class SampledLoop:
             yield Opened(some, A, B, rows)
 
     def opened_at_commands(self, steps: np.ndarray, places: np.ndarray, channels: Sequence[int]) -> Iterator[Opened]:
-        """Some loops (m,), opened at some commands; those of one delay, in steps (n,), together."""
+        """Some loops (m,), opened at some commands, grouped by delay; steps: delays (n,)."""
         commands = self._s + self._m + np.asarray(channels)
         for q in np.unique(steps[places] // self.every):
             some = places[steps[places] // self.every == q]
@@ -197,7 +198,7 @@ class SampledLoop:
             yield Opened(some, A, np.tile(np.eye(A.shape[1])[:, commands], (len(some), 1, 1)), rows)
 
     def observed(self, opened: Opened) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-        """A, B, C of each of some opened loops in what laws see, which is all that their demands depend on."""
+        """A, B, C of each opened loop in the observed states, on which alone the demands depend."""
         base = self._s + self._m
         for i, A, B, C in zip(*opened, strict=True):
             count = int(self._ranks[i])
@@ -206,13 +207,13 @@ class SampledLoop:
             yield smaller, np.concatenate([axes @ B[:base], B[base:]]), np.hstack([C[:, :base] @ axes.T, C[:, base:]])
 
     def _of_seen(self, A: np.ndarray, some: np.ndarray, count: int) -> np.ndarray:
-        """The loops' matrices of what laws see, and of commands."""
+        """The loops' matrices in the observed states and the commands."""
         axes, base = self._axes[some][:, :count], self._s + self._m
         rows = np.concatenate([axes @ A[:, :base], A[:, base:]], axis=1)
         return np.concatenate([rows[:, :, :base] @ np.swapaxes(axes, 1, 2), rows[:, :, base:]], axis=2)
 
     def _matrices(self, factor: np.ndarray, q: int, late: np.ndarray, some: np.ndarray) -> np.ndarray:
-        """The loops' matrices: motion and actuators, parts, commands from the newest to the oldest."""
+        """The loops' matrices; states: motion and actuators, parts, commands from the newest to the oldest."""
         s, m, C = self._s, self._m, self._C
         n = s + m + C * (q + 2)
         A = np.zeros((len(some), n, n))
@@ -231,12 +232,12 @@ class SampledLoop:
 
 
 def _of_states(tick: np.ndarray, P: np.ndarray) -> np.ndarray:
-    """Effect of a tick (rows, 12 + m) on the motion at it and on parts, by states (s) and parts a period before."""
+    """Turn derivatives of a tick by its motion into derivatives by the states (s) one period earlier."""
     return np.concatenate([tick[:, :12] @ P[:12], tick[:, 12:]], axis=1)
 
 
 def _settles(A: np.ndarray) -> np.ndarray:
-    """Whether eigenvalues (m, n, n) are within the unit circle."""
+    """Mask of matrices (m, n, n) whose eigenvalues are all within the unit circle."""
     if not A.shape[1]:
         return np.ones(len(A), bool)
     return np.asarray(np.abs(np.linalg.eigvals(A)).max(axis=1) < 1.0 - ON_CIRCLE)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`trim`: the steady motion of a vehicle, straight and level, and the commands that hold it."""
+"""`trim`: steady straight and level motion of a vehicle, and the commands that hold it."""
 
 from __future__ import annotations
 
@@ -36,17 +36,17 @@ MOST_NAMED = 5
 
 @dataclass(frozen=True)
 class Trim(Saved):
-    """A steady motion, straight and level.
+    """A steady straight and level motion.
 
     Attributes:
-        start: the state, as the start of a scene.
-        commands: by key of each actuator, the commands that hold the motion, (channels,).
-        values: values of the free quantities by name: roll, pitch and drift (course less heading) [rad], speed [m/s],
-            commands as "thrusters[0]".
+        start: the state, which can be the start of a scene.
+        commands: key of an actuator -> commands that hold the motion, (channels,).
+        values: values of the free quantities by name: roll, pitch and drift (course minus heading) [rad], speed [m/s],
+            and commands, such as "thrusters[0]".
         fixed: values of the fixed quantities by name.
-        residual: (6,), remaining accelerations [m/s2, rad/s2], body axes.
-        method: the method whose steps keep the motion.
-        h: its step [s].
+        residual: remaining accelerations (6,) in body axes [m/s2, rad/s2].
+        method: the method whose steps preserve the motion.
+        h: step of the method [s].
     """
 
     study: ClassVar[str] = "trim"
@@ -61,7 +61,7 @@ class Trim(Saved):
 
     @property
     def free(self) -> tuple[str, ...]:
-        """Names of what was free, in the order of the values."""
+        """Names of the free quantities, in the order of the values."""
         return tuple(self.values)
 
     def _content(self) -> dict[str, Any]:
@@ -102,7 +102,7 @@ class Trim(Saved):
 
 
 def _texts(values: Mapping[str, float], digits: int = 6) -> list[str]:
-    """Names with values; a command is in the unit of its term, which is the user's."""
+    """Texts of names with values; a command is in the unit of its term, which the user chooses."""
     units = {name: "rad" for name in ANGLES} | {"speed": "m/s"}
     return [f"{name} {few_digits(value, units.get(name, ''), digits)}" for name, value in values.items()]
 
@@ -117,22 +117,22 @@ def trim(
     method: str | Method | None = None,
     h: float | None = None,
 ) -> Trim:
-    """Find a steady motion, straight and level, at the place and the heading of the scene's start.
+    """Find a steady straight and level motion at the position and heading of the scene's start.
 
-    Velocities and rates are the same after a step of the method: so a run from there stays there, to round-off. It differs
-    from the steady motion of the equations by the method's error of one step. The controller of the scene is left out.
+    Velocities and rates are the same after a step of the method, so a run from there stays there, to round-off. The motion
+    differs from the equations' steady motion by the method's error of one step. The scene's controller is left out.
 
     Args:
-        scene: The scene; of an Ensemble, its scene.
-        speed: Speed over ground [m/s]; None, the default, where it is free, as with a propeller of constant thrust.
-        free: Names of what may be chosen, of "roll", "pitch", "drift" (course less heading), "speed", and commands, such as
-            "thrusters[0]", or "thrusters" for all of a term; None, the default, for all. The others are 0.
-        fixed: Values of what is not free, by the same names; None, the default, for 0.
-        method: As in `lw.solve`; default that of the scene.
-        h: Step [s]; default that of the scene.
+        scene: The scene, or an Ensemble, whose scene is used.
+        speed: Speed over ground [m/s]; None, the default, leaves it free, as for a propeller with constant thrust.
+        free: Names of the quantities that may be chosen: "roll", "pitch", "drift" (course minus heading), "speed", and
+            commands, such as "thrusters[0]", or "thrusters" for all of a term; None, the default, for all. Others are 0.
+        fixed: Values of quantities that are not free, by the same names; None, the default, for 0.
+        method: As in `lw.solve`; default the scene's method.
+        h: Step [s]; default the scene's step.
 
     Returns:
-        The motion, with what was free and what acceleration is left.
+        The motion, with the values of the free quantities and the remaining acceleration.
 
     Raises:
         SceneError: If there is no such motion, or waves or noise act.
@@ -179,7 +179,7 @@ def trim(
 
 
 class _Problem:
-    """Free numbers, and the accelerations that follow."""
+    """The free numbers, and the accelerations that follow from them."""
 
     def __init__(
         self, scene: Scene, bench: MotionBench, speed: float | None, free: Sequence[str] | None, fixed: dict[str, float]
@@ -220,7 +220,7 @@ class _Problem:
         self.ahead = float(np.linalg.norm(velocity)) or 1.0
 
     def guess(self, part: float) -> np.ndarray:
-        """Initial guess: the speed of the start, and parts of the largest commands."""
+        """Initial guess: the speed of the start, and the fraction `part` of the largest commands."""
         values = np.where(np.isfinite(self.most), part * np.minimum(self.most, 1e3), self.ahead)
         return np.where(self.angles, 0.0, values)
 
@@ -240,7 +240,7 @@ class _Problem:
         return Motion(origin.position, R, notation.rotate_into(R, over), np.zeros((m, 3)), origin.memory)
 
     def commands(self, value: Mapping[str, Any]) -> dict[str, np.ndarray]:
-        """Commands by actuator, (..., channels)."""
+        """Commands, key of an actuator -> (..., channels)."""
         return {
             key: np.stack([value[f"{key}[{i}]"] for i in range(len(limit))], axis=-1)
             for key, limit in self.limits.items()
@@ -255,11 +255,11 @@ class _Problem:
         return np.where(np.isfinite(rates), rates, 1e6)
 
     def residual(self, x: np.ndarray) -> np.ndarray:
-        """The accelerations that are left (6,) with these numbers."""
+        """The remaining accelerations (6,) with these numbers."""
         return self._rates(x[None])[0]
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
-        """Their derivatives (6, free), of one launch."""
+        """The derivatives of the accelerations by the free numbers (6, free), from one launch."""
         delta = STEP * np.maximum(1.0, np.abs(x))
         rates = self._rates(np.concatenate([x + np.diag(delta), x - np.diag(delta)]))
         plus, minus = np.split(rates, 2)

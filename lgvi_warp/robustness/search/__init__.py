@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Searches in which a generation is an ensemble: the worst case within bounds, and the best gains for a risk."""
+"""Searches whose generations are ensembles: the worst case within bounds, and the gains with the lowest risk."""

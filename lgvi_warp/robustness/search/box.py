@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A box of numbers with names, and the search of its least cost: evolution, restarts, corners, a walk, and spread points."""
+"""A box of named numbers, and the search for the lowest cost in it."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ Cost = Callable[[np.ndarray], np.ndarray]
 
 @dataclass(frozen=True)
 class SearchBox:
-    """Bounds of numbers of a scene (d,); log: whether the search goes by the logarithm."""
+    """Bounds of numbers of a scene (d,); log: True if the search uses the logarithm of the number."""
 
     names: tuple[str, ...]
     low: np.ndarray
@@ -43,7 +43,7 @@ class SearchBox:
 
     @classmethod
     def of(cls, key: str, bounds: Any, scene: Any) -> SearchBox:
-        """Read bounds of numbers of a scene, (low, high) or (low, high, "log") by name; key: of the argument, for messages."""
+        """Read bounds by name, (low, high) or (low, high, "log"); key: name of the argument, for messages."""
         faults, rows = Faults(), []
         example = '{"heading_pid.kp": (0.5, 5.0)}'
         if not isinstance(bounds, Mapping) or not bounds:
@@ -69,7 +69,7 @@ class SearchBox:
         return cls(names, np.array(low), np.array(high), np.array(logs, bool))
 
     def values(self, inside: np.ndarray) -> np.ndarray:
-        """Numbers (k, d) at places of the unit cube (k, d): at 0 and 1 the bounds, to the last digit."""
+        """Numbers (k, d) at points of the unit cube (k, d); 0 and 1 give exactly the bounds."""
         low, high = (np.log(np.where(self.log, end, 1.0)) for end in (self.low, self.high))
         curved, straight = np.exp(low + inside * (high - low)), self.low + inside * (self.high - self.low)
         within = np.clip(np.where(self.log, curved, straight), self.low, self.high)
@@ -78,9 +78,9 @@ class SearchBox:
 
 @dataclass(frozen=True)
 class BestCandidate:
-    """The best candidate of a search; at: (d,), in the unit cube; restarts: the least cost of each evolution.
+    """The best candidate of a search; at: point (d,) of the unit cube; restarts: the lowest cost of each evolution.
 
-    points: number of candidates that were spread evenly over the cube, whatever the cost was.
+    points: number of candidates that were spread evenly over the cube, independent of their costs.
     """
 
     at: np.ndarray
@@ -91,12 +91,12 @@ class BestCandidate:
 
 
 def least_peak(points: int, confidence: float = 0.95) -> float:
-    """The part of the cube that a region needs so that one of so many spread points lies in it, with this confidence."""
+    """Fraction of the cube that a region must fill to contain a spread point with this confidence."""
     return 1.0 - (1.0 - confidence) ** (1.0 / points) if points else 1.0
 
 
 class _CountedCost:
-    """Counts candidates, and remembers the best."""
+    """Cost function that counts candidates and remembers the best."""
 
     def __init__(self, cost: Cost, most: int, good_enough: float, report: Callable[[int], None]):
         self.cost, self.most, self.good_enough, self.report, self.count = cost, most, good_enough, report, 0
@@ -120,12 +120,12 @@ class _CountedCost:
 def search(
     cost: Cost, d: int, most: int, seed: int, restarts: int, good_enough: float = -math.inf,
     report: Callable[[int], None] = lambda count: None, spend: bool = False) -> BestCandidate:  # fmt: skip
-    """Find the least cost in the unit cube of d dimensions, or one that is good enough.
+    """Find the lowest cost in the unit cube of d dimensions, or a cost that is good enough.
 
-    Evolution (Storn & Price 1997) several times, each from other places; then all corners where they are few; then a walk
-    along the axes from the best place, with steps that shrink where none is better.
-    report: called with the number of candidates tried. spend: whether what is left goes to points spread over the cube, and
-    to walks from the best of them.
+    Differential evolution (Storn & Price 1997) runs several times from different starts. Then come all corners, if they
+    are few, and a walk along the axes from the best point, whose step shrinks if no neighbour is better.
+    report: called with the number of candidates tried. spend: True spends the remaining budget on points spread over
+    the cube, and on walks from the best of them.
     """
     from scipy.optimize import differential_evolution
     from scipy.stats import qmc
@@ -159,9 +159,9 @@ def search(
 
 
 def _spread(ask: _CountedCost, d: int, rng: np.random.Generator) -> int:
-    """Spend most of what is left on Sobol points and on walks from those better than all their neighbours; how many points.
+    """Spend most of the remaining budget on Sobol points and on walks from local minima; returns the number of points.
 
-    Multi-level single linkage (Rinnooy Kan & Timmer 1987), by Sobol points (Kucherenko & Sytsko 2005).
+    Multi-level single linkage (Rinnooy Kan & Timmer 1987) with Sobol points (Kucherenko & Sytsko 2005).
     """
     from scipy.stats import qmc
 
@@ -200,7 +200,7 @@ def _spread(ask: _CountedCost, d: int, rng: np.random.Generator) -> int:
 def _starts(points: np.ndarray, costs: np.ndarray) -> np.ndarray:
     """Indices of points (n, d) that are better than all their neighbours, the best first.
 
-    Of equal ones the first is better.
+    If costs are equal, the first point counts as better.
     """
     from scipy.spatial import cKDTree
 
@@ -216,7 +216,7 @@ def _starts(points: np.ndarray, costs: np.ndarray) -> np.ndarray:
 def _stepped(
     ask: _CountedCost, places: np.ndarray, costs: np.ndarray, steps: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """One step along the axes of walks from places (k, d), to the best neighbour; where none is better the step halves."""
+    """One step of walks from points (k, d) to the best neighbour along the axes; if none is better, halve the step."""
     k, d = places.shape
     sides = np.concatenate([np.eye(d), -np.eye(d)])
     around = np.clip(places[:, None] + steps[:, None, None] * sides, 0.0, 1.0)
@@ -228,7 +228,7 @@ def _stepped(
 
 
 def _walk_from_best(ask: _CountedCost, step: float) -> None:
-    """Walk from the best place of all, until steps are short or nothing is left."""
+    """Walk from the best point so far, until steps are short or the budget is spent."""
     if ask.best is None:
         return
     walk = ask.best[None], np.array([ask.least]), np.array([step])

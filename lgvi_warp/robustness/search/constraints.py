@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Constraints of a search: bounds of margins, metrics and quantities that all members must keep."""
+"""Constraints of a search: bounds on margins, metrics and quantities that all members must keep."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ BROKEN = 1e100
 
 @dataclass(frozen=True)
 class Constraint:
-    """A bound that a number of each member must keep; the bound itself keeps it.
+    """A bound on a number of each member; the bound itself is allowed.
 
-    name: of a metric or a quantity, or of a margin and, behind it, the key of its law.
+    name: name of a metric or a quantity, or of a margin followed by the key of its law.
     """
 
     name: str
@@ -34,38 +34,38 @@ class Constraint:
 
     @property
     def text(self) -> str:
-        """The constraint in words."""
+        """Text of the constraint."""
         return f"{self.name} {self.side} {few_digits(self.bound, self.unit)}"
 
     @property
     def margin(self) -> str | None:
-        """The name of the margin; None of other numbers."""
+        """The name of the margin; None for other numbers."""
         word = self.name.partition(" ")[0]
         return word if word in WORD_OF else None
 
     @property
     def loop(self) -> str | None:
-        """The law of the margin; None for all."""
+        """The law of the margin; None for all laws."""
         return self.name.partition(" ")[2] or None
 
     @property
     def unit(self) -> str:
-        """The unit of a margin; "" of other numbers."""
+        """The unit of a margin; "" for other numbers."""
         return unit_of(self.margin) if self.margin else ""
 
     def slack(self, values: np.ndarray) -> np.ndarray:
-        """Distances of numbers from the bound, below 0 where they break it; minus infinity for NaN."""
+        """Distances of numbers from the bound, negative if they violate it; minus infinity for NaN."""
         slack = values - self.bound if self.side == "above" else self.bound - values
         return np.asarray(np.where(np.isnan(values), -np.inf, slack))
 
     def broken(self, values: np.ndarray) -> np.ndarray:
-        """Extent to which numbers (k, n) of members break it (k,), from 0 to 1; infinite where none has a number."""
+        """Violation (k,) by numbers (k, n) of members, from 0 to 1; infinite if no member has a number."""
         scale = abs(self.bound) or 1.0
         parts = 1.0 - scale / (scale + np.maximum(-self.slack(values), 0.0))
         return np.where(np.isnan(values).all(axis=1), np.inf, parts.mean(axis=1))
 
     def worst(self, values: np.ndarray) -> float:
-        """The number (n,) that is nearest to breaking it, or breaks it most; NaN where a member has none."""
+        """The number among (n,) that is closest to the bound or violates it most; NaN if a member has none."""
         return float(values[np.argmin(self.slack(values))])
 
 
@@ -90,9 +90,9 @@ def constraints_of(faults: Faults, texts: Any, controller: Any) -> tuple[Constra
 
 
 def penalised(risk: np.ndarray, constraints: Sequence[Constraint], values: Sequence[np.ndarray]) -> np.ndarray:
-    """Risks (k,) of candidates by which a search prefers those that keep all constraints, and of others those nearer to it.
+    """Penalised risks (k,): candidates that keep all constraints come first, then those with smaller violations.
 
-    Deb 2000, Comput. Methods Appl. Mech. Engrg. 186. values: by constraint, (k, n).
+    Deb 2000, Comput. Methods Appl. Mech. Engrg. 186. values: one array (k, n) for each constraint.
     """
     total = sum((one.broken(each) for one, each in zip(constraints, values, strict=True)), np.zeros(len(risk)))
     return np.where((total > 0.0) & np.isfinite(risk), BROKEN * (1.0 + total), risk)
@@ -101,7 +101,7 @@ def penalised(risk: np.ndarray, constraints: Sequence[Constraint], values: Seque
 def margins_of(
     constraints: Sequence[Constraint], fleet: Ensemble, settings: Mapping[str, Any]
 ) -> tuple[dict[str, np.ndarray], tuple[str, ...]]:
-    """Margins (n,) by name of a constraint, and what they leave out; those of a loop are computed together."""
+    """Margins, name of a constraint -> (n,), and messages on effects they leave out; one computation for each loop."""
     found: dict[str, np.ndarray] = {}
     messages: dict[str, None] = {}
     wanted = [one for one in constraints if one.margin]

@@ -20,12 +20,12 @@ MOST_NAMED = 4
 
 
 class Numbers:
-    """A prepared run that returns one number of each member: NaN for those that fail, and where a quantity is not finite.
+    """A prepared run that returns one number of each member; NaN if a member fails or a quantity is not finite.
 
-    A metric may be infinite, as a settling time is where a member never settles.
+    A metric may be infinite, such as the settling time of a member that never settles.
 
-    names: of the columns of a call; None where members are given as states. more: further quantities and metrics, each one
-    number more of each member.
+    names: names of the columns of a call; None if members are given as states. more: further quantities and metrics,
+    each with one number of each member.
     """
 
     def __init__(
@@ -53,7 +53,7 @@ class Numbers:
         return {self.label: self._unit} | units_of_numbers(self._scene, names)
 
     def __call__(self, call: Callable[[Prepared], Any]) -> np.ndarray:
-        """The numbers of members (n,), or with `more` (n, 1 + those)."""
+        """The numbers of members (n,); with `more` (n, 1 + number of further quantities)."""
         values, faults = np.asarray(call(self.run)), Faults()
         count = 1 if values.ndim == 1 else values.shape[1]
         if count != self._count:

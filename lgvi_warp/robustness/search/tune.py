@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`tune_gains`: numbers of a controller for which the risk of a fleet is least."""
+"""`tune_gains`: numbers of a controller that minimise the risk of a fleet."""
 
 from __future__ import annotations
 
@@ -34,27 +34,28 @@ from lgvi_warp.statistics.base import Statistic
 
 @dataclass(frozen=True)
 class Tuned(Saved):
-    """Tuned numbers: those of least risk that a search found.
+    """Tuned numbers: the numbers with the lowest risk that a search found.
 
     Attributes:
         parameters: the numbers by name.
         before: the scene's own numbers.
-        cost: their risk over the members of the search: optimistic, since the numbers were chosen with these members.
-        fresh_cost: their risk over members that the search did not see; NaN where none can be drawn.
+        cost: risk over the members of the search; optimistic, since the numbers were chosen with these members.
+        fresh_cost: risk over new members, which the search did not use; NaN if no new members can be drawn.
         fresh_before: risk of the scene's own numbers, over the same fresh members.
         of: name of the quantity.
-        risk: what the risk is, in words.
+        risk: description of the risk.
         members: number of members that the search used.
         fresh: number of fresh members.
-        at_bounds: names of the numbers that lie at their bounds: these may be too narrow.
-        restarts: (r,), the least risk of each evolution.
+        at_bounds: names of the numbers that lie at their bounds; the bounds may be too narrow.
+        restarts: (r,), the lowest risk of each evolution.
         runs: number of members that were run.
         units: unit of the quantity and of the numbers, by name.
-        constraints: by text, such as "disk above 0.5": "worst", the value that is nearest to breaking it, or breaks it most,
-            among members of the search; "fresh_worst", the same among fresh members; "fresh_before", among fresh members with
-            the scene's own numbers; "fresh_broken", how many fresh members break it. NaN if a member has no value.
-        messages: what the margins of constraints leave out.
-        feasible: whether all members of the search keep all constraints.
+        constraints: text, such as "disk above 0.5" -> dict. "worst": value of the member of the search that is closest
+            to the bound or violates it most; "fresh_worst": the same among fresh members; "fresh_before": the same
+            among fresh members with the scene's own numbers; "fresh_broken": number of fresh members that violate the
+            bound. NaN if a member has no value.
+        messages: notes on effects that the margins of constraints leave out.
+        feasible: True if all members of the search keep all constraints.
     """
 
     study: ClassVar[str] = "tune_gains"
@@ -78,7 +79,7 @@ class Tuned(Saved):
 
     @property
     def optimism(self) -> float:
-        """Difference between the risk of fresh members and that seen in the search."""
+        """Risk of fresh members minus risk of the members of the search."""
         return self.fresh_cost - self.cost
 
     def _content(self) -> dict[str, Any]:
@@ -135,7 +136,7 @@ class Tuned(Saved):
 
 
 def _least_kept(numbers: Mapping[str, float], fresh: int) -> str:
-    """Words for how a constraint is kept."""
+    """Text on the members that keep or violate a constraint."""
     words = ["none" if math.isnan(value) else f"{value:.4g}" for value in (numbers["worst"], numbers["fresh_worst"])]
     if not fresh:
         return f"at worst {words[0]}"
@@ -161,30 +162,31 @@ def tune_gains(
 ) -> Tuned:
     """Tune numbers, such as gains, to minimise the risk over a fleet.
 
-    Every candidate runs on the same members, with the same noise: a generation is an ensemble of candidates times members.
-    The best one is then run on fresh members.
+    Every candidate runs on the same members, with the same noise: a generation is an ensemble of candidates times
+    members. The best candidate is then run on fresh members.
 
     Args:
-        fleet: The members, drawn by distributions; or a Scene, whose [ensemble] is used.
-        over: (low, high), or (low, high, "log"), of each number by name: {"heading_pid.kp": (0.1, 10.0, "log")}.
-        minimise: The cost, one number of each member: a quantity, as in `lw.prepare`; or a metric, as in `lw.sweep`:
-            "iae depth", lw.metrics.SettlingTime("depth", within=0.5).
-        risk: "mean", the default; the level of a quantity's quantile, such as 0.95; or `lw.metrics.CVaR(0.05)`, the mean of
-            the worst 5 %. A member that fails has an infinite cost.
-        budget: Number of members that the search may run, those of all candidates together; 100,000 by default.
-        fresh: Number of fresh members; None, the default, for four times those of the fleet.
+        fleet: An Ensemble, whose members are drawn from distributions; or a Scene, whose [ensemble] is used.
+        over: Numbers to tune, by name, with their bounds (low, high), or (low, high, "log") to search by the logarithm:
+            {"heading_pid.kp": (0.1, 10.0, "log")}.
+        minimise: The cost, one number of each member: a quantity, as in `lw.prepare`; or a metric, as in `lw.sweep`,
+            such as "iae depth" or lw.metrics.SettlingTime("depth", within=0.5).
+        risk: "mean", the default; the level of a quantile, such as 0.95; or `lw.metrics.CVaR(0.05)`, the mean cost of
+            the worst 5 % of the members. A member that fails has an infinite cost.
+        budget: Number of members that the search may run, over all candidates; 100,000 by default.
+        fresh: Number of fresh members; None, the default, for four times the fleet's number of members.
         restarts: Number of evolutions; 1 by default.
         seed: Seed of the search; 0 by default.
-        constraints: Bounds that every member must keep: "disk above 0.5" of all laws, "phase heading_pid above 0.6" of one, as
-            `lw.linear.margins` names margins; "overshoot depth below 0.3" of a metric, "max(depth) below 12.0" of a quantity.
-            Candidates that keep all bounds are preferred to all others. A loop that does not settle violates every bound.
-            None by default.
-        progress: True shows a bar or lines, as in lw.solve; a function is called with the part of the budget that is used.
+        constraints: Bounds that every member must keep: on a margin of all laws, "disk above 0.5", or of one law,
+            "phase heading_pid above 0.6", with the names of `lw.linear.margins`; on a metric, "overshoot depth below
+            0.3"; on a quantity, "max(depth) below 12.0". Candidates that keep all bounds are preferred to all others. A
+            loop that does not settle violates every bound on its margins. None by default.
+        progress: True shows a bar or lines, as in lw.solve; a function is called with the used fraction of the budget.
             None, the default: nothing is shown.
         **settings: As in `lw.prepare`: method, h, t1, save, dtype, threads, ...
 
     Returns:
-        The numbers, with their risk over the members of the search and over fresh ones.
+        The numbers, with their risk over the members of the search and over fresh members.
 
     Raises:
         SceneError: If an argument is at fault.
@@ -267,7 +269,7 @@ def tune_gains(
 
 
 def _checked_box(faults: Faults, ensemble: Ensemble, over: Any, budget: Any) -> SearchBox | None:
-    """The numbers to be searched, of which none may vary; None after a fault of theirs."""
+    """The box of numbers to search, none of which may vary by member; None if it is faulty."""
     box = None
     with faults.including():
         box = SearchBox.of("over", over, ensemble.scene)
@@ -282,13 +284,13 @@ def _checked_box(faults: Faults, ensemble: Ensemble, over: Any, budget: Any) -> 
 
 
 def _array_of(name: str) -> str:
-    """The array that a number is of; all forms of an attitude are one."""
+    """Name of the array of a number; all forms of an attitude share one name."""
     array = name.split("[")[0]
     return "attitude" if array.removeprefix("start.") in ATTITUDES else array
 
 
 class _Costs:
-    """Costs of candidates (k, d), of each member, and what constraints bound that is no margin: (1 + c, k, members)."""
+    """Costs of candidates (k, d) by member, and the c constrained numbers except margins: (1 + c, k, members)."""
 
     def __init__(
         self, numbers_of: Numbers, fleet: Ensemble, box: SearchBox, constraints: Sequence[Constraint],
@@ -305,7 +307,7 @@ class _Costs:
         self._varied = {name: np.broadcast_to(v, (n, *v.shape[1:])) for name, v in varied.items()}
 
     def _members_with(self, candidates: np.ndarray) -> tuple[np.ndarray, dict[str, Any], dict[str, np.ndarray]]:
-        """Members (k n,) of candidates: their places in the fleet, states, and parameters."""
+        """Members (k n,) of candidates: their indices in the fleet, states and parameters."""
         members, k = self._members, len(candidates)
         n = members.count
         every = np.tile(np.arange(n), k)
@@ -336,7 +338,7 @@ class _Costs:
         return np.moveaxis(numbers, 2, 0)
 
     def bounded(self, candidates: np.ndarray, numbers: np.ndarray, good: np.ndarray) -> list[np.ndarray]:
-        """Numbers that the constraints bound, each (k, members); margins of the good candidates (k,) alone, else NaN."""
+        """Numbers that the constraints bound, each (k, members); margins only where `good` (k,), else NaN."""
         others, found = iter(numbers), dict[str, np.ndarray]()
         if good.any() and any(one.margin for one in self._constraints):
             _, states, parameters = self._members_with(candidates[good])
@@ -354,7 +356,7 @@ class _Costs:
     def judged(
         self, candidate: np.ndarray, measure: Callable[[np.ndarray], np.ndarray]
     ) -> tuple[float, list[np.ndarray]]:
-        """The risk of one candidate (1, d), and what the constraints bound, each (members,)."""
+        """The risk of one candidate (1, d), and the numbers that the constraints bound, each (members,)."""
         each = self(candidate)
         risks = np.asarray(measure(each[0]))
         return float(risks[0]), [values[0] for values in self.bounded(candidate, each[1:], np.isfinite(risks))]

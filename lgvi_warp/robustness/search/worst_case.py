@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`worst_case`: numbers within bounds for which a quantity is worst."""
+"""`worst_case`: search for the numbers within bounds at which a quantity is worst."""
 
 from __future__ import annotations
 
@@ -31,20 +31,20 @@ WORST = ("largest", "smallest")
 
 @dataclass(frozen=True)
 class WorstCase(Saved):
-    """The worst member that a search found: a lower bound of the true worst.
+    """The worst member that a search found; the true worst case may be worse.
 
     Attributes:
         parameters: values of the searched numbers, by name.
-        value: the quantity of this member; infinite if it failed, in which case it is the first failed member found.
+        value: the quantity of this member; infinite if the member failed. The search ends at the first failed member.
         of: name of the quantity.
         worst: "largest" or "smallest".
-        at_bounds: by name of a number, the bound at which it lies: "low", "high", or "" for none.
-        restarts: (r,), the worst value of each evolution: if they differ, a longer search may find a worse one.
+        at_bounds: name of a number -> the bound at which it lies: "low", "high", or "" for none.
+        restarts: (r,), the worst value of each evolution; if they differ, a longer search may find a worse value.
         runs: number of members that were run.
-        fleet: the member, to run it again; None if this was read from a file. The table worst_case.csv beside the file has its
-            numbers: lw.Ensemble(scene, sampling=lw.designs.Table("worst_case.csv")) is then the member.
-        of_metric: whether the quantity is a metric, which is infinite where a loop never gets there; by default False.
-        points: number of members that were spread evenly over the box, whatever their quantity.
+        fleet: ensemble of this one member, to run it again; None if this answer was read from a file. The table worst_case.csv
+            in its folder also gives the member: lw.Ensemble(scene, sampling=lw.designs.Table("worst_case.csv")).
+        of_metric: True if the quantity is a metric, which is infinite for a loop that never settles; by default False.
+        points: number of members that were spread evenly over the box.
         units: unit of the quantity and of the numbers, by name.
     """
 
@@ -64,7 +64,7 @@ class WorstCase(Saved):
 
     @property
     def unseen(self) -> float:
-        """Part of the box that a separate peak needs so that one of the spread points meets it with 95 %; 1 without points."""
+        """Fraction of the box that a peak must fill to be found with probability 95 %; 1 without spread points."""
         return least_peak(self.points)
 
     def _content(self) -> dict[str, Any]:
@@ -121,22 +121,22 @@ def worst_case(
 ) -> WorstCase:
     """Search for the worst case of a quantity within bounds of the scene's numbers.
 
-    Differential evolution, in which a generation is an ensemble, runs several times from different starts. Then come the
-    corners of the box, if they are few, and a local search from the worst point. The rest of the budget goes to Sobol
-    points over the whole box, and to local searches from the worst of them. Noise is the same for all. Unseen cases may be
-    worse: `unseen` of the answer says how small it must be.
+    Differential evolution runs several times from different starts; each generation is an ensemble. Then come the corners
+    of the box, if they are few, and a local search from the worst point. The rest of the budget goes to Sobol points over
+    the whole box, and to local searches from the worst of them. All members get the same noise. A worse case may remain
+    unseen: `unseen` of the answer is the fraction of the box that a peak must fill to be found with probability 95 %.
 
     Args:
-        fleet: A Scene, or an Ensemble, of which the scene is used: numbers that are not searched are the scene's.
-        within: (low, high) of each number by name, such as {"vehicle.buoyancy": (297.0, 302.0)}; (low, high, "log") where
-            the search should go by the logarithm.
-        of: A quantity of one number, as in `lw.prepare`: "max(depth)", a Quantity, a function of a Result; or a metric, as
-            of `lw.sweep`: "overshoot depth", lw.metrics.SettlingTime("depth", within=0.5).
-        worst: "largest", the default, or "smallest". A member that fails is worse than all others, and ends the search.
+        fleet: A Scene, or an Ensemble, whose scene is used. Numbers that are not searched keep the scene's values.
+        within: Numbers to search, by name, with their bounds (low, high), such as {"vehicle.buoyancy": (297.0, 302.0)};
+            or (low, high, "log") to search by the logarithm.
+        of: A quantity with one number, as in `lw.prepare`: "max(depth)", a Quantity, a function of a Result; or a
+            metric, as in `lw.sweep`: "overshoot depth", lw.metrics.SettlingTime("depth", within=0.5).
+        worst: "largest", the default, or "smallest". A member that fails is worse than all others and ends the search.
         budget: Number of members that may be run; 20,000 by default.
-        restarts: Number of evolutions; 3 by default, fewer where the budget is small.
+        restarts: Number of evolutions; 3 by default, fewer if the budget is small.
         seed: Seed of the search; 0 by default.
-        progress: True shows a bar or lines, as in lw.solve; a function is called with the part of the budget that is used.
+        progress: True shows a bar or lines, as in lw.solve; a function is called with the used fraction of the budget.
             None, the default: nothing is shown.
         **settings: As in `lw.prepare`: method, h, t1, save, dtype, threads, ...
 

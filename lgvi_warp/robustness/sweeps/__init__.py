@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Sweeps: cases of a closed loop on the same members, what of them holds, and which case is better."""
+"""Sweeps: run cases of a closed loop on the same members, and compare their success."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Cases of a sweep: one scene each, made of the sweep's by other numbers, other parts or another vehicle; and the grid."""
+"""Cases of a sweep, and its grid. A case is the sweep's scene with other numbers, other parts or another vehicle."""
 
 from __future__ import annotations
 
@@ -30,18 +30,19 @@ class Case:
     """One design of a sweep.
 
     Args:
-        name: its name.
-        set: numbers that differ from those of the scene, by name: {"heading_pid.kp": 2.0, "drag.quadratic[0]": 3.0}. A number
-            that varies in the fleet is constant in this case.
-        replace: lists that differ: {"laws": [...]} or another list of the controller, "events", the whole "controller", or
-            "terms". An entry of "terms" replaces the term of the same name, or is added if there is none.
-        vehicle: another vehicle: lw.Vehicle(...), or numbers of it by field; None (default) for that of the scene.
-        scene: another scene, to which the rest is applied; None (default) for that of the sweep.
-        rare: True for the probability that a member does not pass, however small, by lw.rare_event; or some of its arguments,
-            {"relative_error": 0.2, "cheaper": [{"h": 0.1}], "most": 200_000}. None (default) for what the sweep says.
+        name: name of the case.
+        set: numbers by name that replace the scene's: {"heading_pid.kp": 2.0, "drag.quadratic[0]": 3.0}. A number that
+            varies in the fleet is constant in this case.
+        replace: lists that replace the scene's: {"laws": [...]} or another list of the controller, "events", the whole
+            "controller", or "terms". An entry of "terms" replaces the term of its name, or is added.
+        vehicle: another vehicle, lw.Vehicle(...), or some of its numbers by field; None (default) for the scene's vehicle.
+        scene: another scene, to which the rest is applied; None (default) for the sweep's scene.
+        rare: True estimates the probability that a member does not pass, even if it is very small, by lw.rare_event; or
+            a dict with some arguments of lw.rare_event, {"relative_error": 0.2, "cheaper": [{"h": 0.1}], "most":
+            200_000}. None (default) takes the sweep's `rare`.
 
     Raises:
-        SceneError: something is of the wrong kind.
+        SceneError: an argument has the wrong type.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -77,7 +78,7 @@ class Case:
             scene: the sweep's scene.
 
         Returns:
-            That scene, or the case's own, with its vehicle, its lists and its numbers.
+            The sweep's scene, or the case's own scene, with the vehicle, lists and numbers of the case.
 
         Raises:
             SceneError: the case does not fit the scene.
@@ -93,7 +94,7 @@ class Case:
 
 
 def cases_of(tables: Any) -> tuple[Case, ...]:
-    """The cases of a sweep; of None the scene itself.
+    """Read the cases of a sweep; None means the scene itself.
 
     tables: `Case` and tables with its arguments; or a mapping of names to these tables, or to the numbers that a case sets.
     """
@@ -128,7 +129,7 @@ def cases_of(tables: Any) -> tuple[Case, ...]:
 
 
 def check_rare(faults: Faults, rare: Any) -> None:
-    """Note what is wrong with what is said of rare failures."""
+    """Add errors in the argument `rare` to the faults."""
     if isinstance(rare, Mapping):
         faults.keys("rare", rare, RARE)
         if not rare:
@@ -138,7 +139,7 @@ def check_rare(faults: Faults, rare: Any) -> None:
 
 
 def grid_of(grid: Any) -> dict[str, list[Any]]:
-    """The axes of a sweep's grid, name of a number -> its values; of None no axes."""
+    """Axes of a sweep's grid, name of a number -> its values; None means no axes."""
     if grid is None:
         return {}
     if not isinstance(grid, Mapping):
@@ -155,12 +156,12 @@ def grid_of(grid: Any) -> dict[str, list[Any]]:
 
 
 def points_of(axes: Mapping[str, Sequence[Any]]) -> list[dict[str, Any]]:
-    """All combinations of the values of a grid, the last axis fastest; one without numbers where there is no axis."""
+    """All combinations of the values of a grid, the last axis fastest; without axes, one empty combination."""
     return [dict(zip(axes, values, strict=True)) for values in itertools.product(*axes.values())]
 
 
 def with_lists(scene: Scene, lists: Mapping[str, Any]) -> Scene:
-    """The scene with other parts; terms replace those of the same name, and are added otherwise."""
+    """The scene with other parts. A term replaces the term of the same name, or is added if there is no such term."""
     known = (*SECTIONS, *LISTS)
     faults = Faults("replace.")
     for name in lists:
@@ -181,14 +182,14 @@ def with_lists(scene: Scene, lists: Mapping[str, Any]) -> Scene:
 
 
 def known_names(scene: Scene) -> set[str]:
-    """The names of all that may vary in a scene."""
+    """Names of all quantities that may vary in a scene."""
     return {*scene.parameters(), *(f"start.{name}" for name in NAMES)}
 
 
 def ensemble_of(
     scene: Scene, numbers: Mapping[str, Any], vary: Mapping[Any, Any], like: Ensemble
 ) -> tuple[Ensemble, list[str]]:
-    """The members of a case, those of all as far as it has what varies and does not set it; and names of what does not."""
+    """The members of a case, and names of quantities that do not vary: the case sets them or does not have them."""
     known = known_names(scene)
     fixed = {target.name for name in numbers for target in variations.targets(by_key(scene, name))}
     dropped = [name for name in vary if any(t.name in fixed or t.name not in known for t in variations.targets(name))]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Cases of a sweep on the same members, two at a time and all of them in their order."""
+"""Comparisons of two cases of a sweep on the same members, and the ranking of all cases."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ from lgvi_warp.statistics.estimates import paired
 class PairedComparison:
     """A difference between two cases on the same members, at one point of the grid.
 
-    only: how many members pass with the first alone, and with the second alone.
-    matters: the least difference that matters, in its unit; NaN where none was given.
-    more_is_better: whether the second is better where its value is more.
+    only: number of members that pass only with the first case, and only with the second case.
+    matters: the smallest difference that matters, in its unit; NaN if none was given.
+    more_is_better: True if a larger value is better.
     """
 
     first: str
@@ -43,7 +43,7 @@ class PairedComparison:
 
     @property
     def verdict(self) -> str:
-        """Verdict on the second beside the first: "better", "worse", "equivalent" or "undecided"; "" where none was given."""
+        """Verdict on the second case: "better", "worse", "equivalent" or "undecided"; "" if `matters` was not given."""
         if np.isnan(self.matters):
             return ""
         return verdict(self.difference, self.matters, self.real, self.more_is_better)
@@ -59,7 +59,7 @@ class PairedComparison:
 
 
 def compared(table: SweepTable, a: SweepCell, b: SweepCell, quantile: float | None) -> list[PairedComparison]:
-    """Success and each metric of two cells, means or quantiles; nothing where a cell was refused."""
+    """Compare success and each metric of two cells, by means or quantiles; empty if a cell was refused."""
     records = table.record(a), table.record(b)
     if any(record.refused for record in records):
         return []
@@ -83,7 +83,7 @@ def compared(table: SweepTable, a: SweepCell, b: SweepCell, quantile: float | No
 
 
 def _more_is_better(table: SweepTable, metric: str) -> bool:
-    """Whether more of a metric is better: where success limits it from below alone; of others less is."""
+    """True if a larger value of a metric is better: success limits it only from below. Otherwise smaller is better."""
     above, below = table.conditions.limits.get(metric, (-np.inf, np.inf))
     return bool(np.isfinite(above) and not np.isfinite(below))
 
@@ -99,7 +99,7 @@ def _of_success(table: SweepTable, a: SweepCell, b: SweepCell) -> PairedComparis
 
 
 def corrected(rows: list[PairedComparison], confidence: float) -> list[PairedComparison]:
-    """Comparisons made together, p corrected for their number; real by that, or by their interval where there is no test."""
+    """Correct p for the number of comparisons; `real` follows from it or, without a test, from the interval."""
     answers = []
     for row, p in zip(rows, paired.holm(np.array([row.difference.p for row in rows])), strict=True):
         d = row.difference
@@ -109,7 +109,7 @@ def corrected(rows: list[PairedComparison], confidence: float) -> list[PairedCom
 
 
 def ranks(table: SweepTable, at: Mapping[str, Any] | None) -> list[dict[str, Any]]:
-    """The cases by success, and which others each is better than by more than chance, as `Sweep.ranking` says."""
+    """Rank the cases by success, with the cases that each is significantly better than, as in `Sweep.ranking`."""
     shares: dict[str, np.ndarray] = {}
     single = len(table.cells_of(table.cases[0], at)) == 1
     for case in table.cases:
@@ -158,5 +158,5 @@ def _mean_share(share: np.ndarray, table: SweepTable) -> Probability:
 
 
 def _unseen(count: int, table: SweepTable) -> float:
-    """The upper limit of the part of the members that do what none of so many did."""
+    """Upper limit of the fraction of members with a property that none of `count` members has."""
     return probability(0, count, table.confidence, table.interval).upper

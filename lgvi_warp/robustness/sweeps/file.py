@@ -64,7 +64,7 @@ KEYS_PAGE = "docs/guide/is_my_controller_robust.md"
 
 
 def _case(entry: Any, folder: Path, scene_path: Path) -> Any:
-    """The table of a case, with its scene and its vehicle made."""
+    """The table of a case, with its scene and its vehicle as objects."""
     if not isinstance(entry, Mapping):
         raise refusal("cases", entry, "is not a table", 'write [[cases]] and name = "pid" below')
     case = dict(entry)

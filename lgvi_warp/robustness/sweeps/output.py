@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Output of a sweep: comparisons, ranks, the worst members and their causes, as tables, files and words."""
+"""Output of a sweep: comparisons, ranks, the worst members and their causes, as tables, files and texts."""
 
 from __future__ import annotations
 
@@ -37,17 +37,17 @@ LISTED = 20
 
 
 class Sweep(SweepTable):
-    """Answer of a sweep: success, comparisons, ranks, the worst members; as tables, files and words.
+    """Answer of a sweep: success, comparisons, ranks and the worst members, as tables, files and texts.
 
     Attributes:
-        setup: what was run.
-        cells: its cells, cases times points of the grid, in order.
-        records: results of their members.
-        conditions: what a member must fulfil to pass.
+        setup: description of the runs.
+        cells: all combinations of a case and a point of the grid, in order.
+        records: results of the cells' members.
+        conditions: conditions that a member must fulfil to pass.
         baseline: name of the case that others are compared with.
         confidence: confidence level of all intervals.
-        interval: how intervals of probabilities are formed.
-        rares: rare failures of the cells that ask for them; None where none does.
+        interval: kind of the confidence intervals of probabilities.
+        rares: rare failures of the cells that request them; None if no cell does.
         matters: smallest differences that matter, as given: by "success" [points] or name of a metric [its unit].
         cases: names of the cases.
         metrics: names of the metrics.
@@ -61,9 +61,9 @@ class Sweep(SweepTable):
         causes: Inputs that explain success or a metric.
         values: A metric of all members.
         survival: Probability that a member neither failed nor was stopped by each time.
-        members: Members that do not pass, or those that do.
-        again: Run members of a case again, with samples.
-        rare: Rare failure of a case.
+        members: Indices of members that fail to pass, or of members that pass.
+        again: Run members of a case again and save their samples.
+        rare: Probability of a rare failure of a case.
         compare_rare: Compare the rare failures of two cases.
         rows: Success and metrics of each cell, as records.
         save: Write tables and summary into a folder.
@@ -71,7 +71,7 @@ class Sweep(SweepTable):
 
     @property
     def answer(self) -> str:
-        """The best and the worst cells in one sentence; `str` ends with it."""
+        """The best and the worst cells in one sentence; the text of `str` ends with it."""
         return answer_of(self)
 
     def compare(
@@ -84,21 +84,20 @@ class Sweep(SweepTable):
     ) -> list[PairedComparison]:
         """Compare two cases on the same members: their success and each metric, at each point of the grid.
 
-        Success: difference of proportions of the members that differ, Tango's interval, McNemar's exact test. Metrics:
-        paired t of members that failed in neither case and whose numbers are finite; or of a quantile, by the bootstrap of
-        members. p is corrected for all of these comparisons by Holm. docs/guide/is_my_controller_robust.md says how to read
-        it.
+        Success: difference of the paired proportions, with Tango's interval and McNemar's exact test. Metrics: paired t
+        test over members that failed in neither case and whose numbers are finite; for a quantile, a bootstrap over
+        members. Holm's method corrects p for the number of comparisons. See docs/guide/is_my_controller_robust.md.
 
         Args:
             first: name of a case.
-            second: name of another case; differences are second less first.
+            second: name of another case; differences are second minus first.
             at: values of the grid by name; None (default) for all points.
-            quantile: level of the quantile to compare in place of means; None (default) for means.
-            matters: the least difference that matters, as in `lw.sweep`; None (default) for that of the sweep.
+            quantile: level of a quantile that is compared instead of the mean; None (default) for means.
+            matters: the smallest difference that matters, as in `lw.sweep`; None (default) takes the sweep's.
 
         Returns:
-            The comparisons, success first at each point; `row()` of one is a record of a table, and `verdict` "better",
-            "worse", "equivalent" or "undecided" where it is known what matters.
+            The comparisons; at each point, success comes first. `row()` of a comparison is a record of a table. If
+            `matters` is given, its `verdict` is "better", "worse", "equivalent" or "undecided".
 
         Raises:
             SceneError: there is no such case, point or metric.
@@ -108,31 +107,31 @@ class Sweep(SweepTable):
         return self.corrected_for_number([row for a, b in pairs for row in compared(judged, a, b, quantile)])
 
     def corrected_for_number(self, rows: list[PairedComparison]) -> list[PairedComparison]:
-        """Correct p of comparisons that were made together for their number, by Holm.
+        """Correct p of simultaneous comparisons for their number, by Holm's method.
 
         Args:
             rows: the comparisons, as in `compare`.
 
         Returns:
-            The same with `p` corrected, and `real` by that and the sweep's confidence.
+            The same comparisons with corrected `p`; `real` is True if the difference is significant.
         """
         kind = "difference p real", "a comparison", "give those of Sweep.compare"
         return corrected([of_kind(f"rows[{i}]", row, *kind) for i, row in enumerate(rows)], self.confidence)
 
     def rare(self, case: str, at: Mapping[str, Any] | None = None) -> RareEvent:
-        """Return the rare failure of a case that asks for it: the probability that a member does not pass.
+        """Return the rare failure of a case that requests it: the probability that a member does not pass.
 
-        Its failing members are those that are compared with other cases, some 4,000 at most.
+        Its failing members are those that comparisons run in other cases, some 4,000 at most.
 
         Args:
             case: name of the case.
-            at: values of the grid by name; may be left out where there is no grid.
+            at: values of the grid by name; may be left out if there is no grid.
 
         Returns:
-            The answer of `lw.rare_event`: probability, interval, failing members, the likeliest of them.
+            The answer of `lw.rare_event`: probability, interval, failing members, and the likeliest of them.
 
         Raises:
-            SceneError: there is no such case or point, it did not ask, or it was refused.
+            SceneError: there is no such case or point, the case did not request it, or it was refused.
         """
         cell = self.cell(case, at)
         answer = None if self.rares is None else self.rares.of(cell)
@@ -145,18 +144,18 @@ class Sweep(SweepTable):
         return answer.found
 
     def compare_rare(self, first: str, second: str, at: Mapping[str, Any] | None = None) -> list[RareComparison]:
-        """Compare the rare failures of two cases, at each point of the grid: how many times as often the second fails.
+        """Compare the rare failures of two cases at each point of the grid: ratio of their failure probabilities.
 
-        Failing members of either are run in both, with the same numbers and noise: P(B) / P(A) = P(B | A) / P(A | B). Where
-        too few fail in both, it is the ratio of the two answers. p is corrected for all of these comparisons by Holm.
+        Failing members of each case are run in the other case, with the same numbers and noise: P(B) / P(A) = P(B | A)
+        / P(A | B). If too few fail in both, the ratio of the two answers is used. Holm's method corrects p.
 
         Args:
             first: name of a case.
-            second: name of another case; ratios are second over first.
+            second: name of another case; ratios are second divided by first.
             at: values of the grid by name; None (default) for all points.
 
         Returns:
-            The comparisons, of points where both have a rare failure; `row()` of one is a record of a table.
+            The comparisons at points at which both cases have a rare failure; `row()` of each is a record of a table.
 
         Raises:
             SceneError: there is no such case or point.
@@ -165,17 +164,17 @@ class Sweep(SweepTable):
         return [] if self.rares is None else self.rares.compare(pairs)
 
     def ranking(self, at: Mapping[str, Any] | None = None) -> list[dict[str, Any]]:
-        """Rank the cases by success, and say of which others each is better than chance explains, and by how much.
+        """Rank the cases by success, with the cases that each is significantly better than, and by how much.
 
-        With a grid a case's success is the mean over its points, of each member's share of points passed; a case that was
-        refused at a point is left out. All pairs of cases are tested, McNemar's exact test or with a grid a paired t of
-        shares, and p is corrected for all pairs by Holm.
+        With a grid, a case's success is the mean over members of the share of points at which the member passes. A case
+        that was refused at a point is left out. All pairs of cases are tested: by McNemar's exact test or, with a grid,
+        by a paired t test of the shares. Holm's method corrects p for the number of pairs.
 
         Args:
             at: values of the grid by name; None (default) for all points.
 
         Returns:
-            Records with rank, case, value, lower, upper, better_than and better_by, the best first.
+            Records with rank, case, value, lower, upper, better_than and better_by; the best case comes first.
 
         Raises:
             SceneError: there is no such point.
@@ -183,15 +182,15 @@ class Sweep(SweepTable):
         return ranks(self, at)
 
     def worst(self, count: int = 20, by: str | None = None, case: str | None = None) -> list[dict[str, Any]]:
-        """Find the worst members of all cells: those that failed, the earliest first, then by a metric, the largest first.
+        """Find the worst members of all cells: failed members, the earliest first, then the largest by a metric.
 
         Args:
-            count: how many; by default 20.
-            by: name of the metric; default the first one that success limits from above, else the first one.
+            count: number of members; by default 20.
+            by: name of the metric; default the first metric that success limits from above, else the first metric.
             case: name of the case; None (default) for all.
 
         Returns:
-            Records with case, point, member, status, whether it passed, the metrics and what varies.
+            Records with case, point, member, status, passed, the metrics and the inputs that vary.
 
         Raises:
             SceneError: there is no such metric or case.
@@ -223,17 +222,17 @@ class Sweep(SweepTable):
     def causes(self, case: str, at: Mapping[str, Any] | None = None, of: str = SUCCESS) -> list[dict[str, Any]]:
         """Find which of the inputs that vary explain success or a metric, the most important first.
 
-        share: the part of the variance over members that the mean over this input explains, from the members at hand (by
-        bins), with its interval and the F test's p, corrected for the number of inputs by Holm. slope: the standardised
-        coefficient of a linear regression on all inputs. Inputs are meant to be drawn independently.
+        share: fraction of the variance over members that the conditional mean given this input explains. It is estimated by
+        bins of the members at hand, with its interval and the p of an F test, corrected for the number of inputs by Holm's
+        method. slope: standardised coefficient of a linear regression on all inputs. Inputs should be independent.
 
         Args:
             case: name of the case.
-            at: values of the grid by name; may be left out where there is no grid.
+            at: values of the grid by name; may be left out if there is no grid.
             of: "success" (default), or the name of a metric, over members that did not fail.
 
         Returns:
-            Records with input, share, lower, upper, p, slope, and the input's median where members pass and where they do not.
+            Records with input, share, lower, upper, p, slope, and the input's medians over passing and other members.
 
         Raises:
             SceneError: there is no such case, point or metric, or it was refused.
@@ -258,17 +257,17 @@ class Sweep(SweepTable):
         save: SaveAt | None = None,
         threads: int | None = None,
     ) -> Result:
-        """Run members again alone, with the bits that they had, and save their samples.
+        """Run some members again, with bit-identical results, and save their samples.
 
         Args:
             case: name of the case.
-            members: their indices.
-            at: values of the grid by name; may be left out where there is no grid.
-            save: which samples, and when; default as the scene says.
+            members: indices of the members.
+            at: values of the grid by name; may be left out if there is no grid.
+            save: sample times and fields; default those of the scene.
             threads: number of threads; default as in `lw.solve`.
 
         Returns:
-            Their result.
+            The result of these members.
 
         Raises:
             SceneError: there is no such case, point or member.
@@ -278,16 +277,16 @@ class Sweep(SweepTable):
     def save(self, folder: str | os.PathLike[str]) -> list[Path]:
         """Write table.csv, comparison.csv, ranking.csv, worst.csv, causes.csv, sweep.json and summary.md into a folder.
 
-        Where rare failures were asked for, rare.csv and rare_comparison.csv too.
+        If rare failures were requested, rare.csv and rare_comparison.csv are written, too.
 
         Args:
-            folder: of the files, made if needed.
+            folder: folder of the files, created if needed.
 
         Returns:
             Paths of the files.
 
         Raises:
-            OSError: they cannot be written.
+            OSError: the files cannot be written.
         """
         target = path_of("folder", folder)
         target.mkdir(parents=True, exist_ok=True)
@@ -315,7 +314,7 @@ def _median(x: np.ndarray) -> float:
 
 
 def provenance(table: SweepTable) -> dict[str, Any]:
-    """All that the sweep follows from, of plain types."""
+    """All inputs that determine the sweep, as plain types."""
     setup = table.setup
     cells = [{"case": cell.case.name, "at": {name: as_json(value) for name, value in cell.point.items()}, "key": cell.key,
               "fixed": list(cell.fixed), "refused": table.record(cell).refused, "messages": list(table.record(cell).messages)}
@@ -330,7 +329,7 @@ def provenance(table: SweepTable) -> dict[str, Any]:
 
 
 def as_json(value: Any) -> Any:
-    """A value as JSON can hold it: plain types, others as text."""
+    """Convert a value for JSON: plain types unchanged, others to text."""
     if isinstance(value, np.ndarray | np.generic):
         value = value.tolist()
     if isinstance(value, float) and not np.isfinite(value):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Rare failures of a sweep's cells: how probable each is, and how many times as probable as that of another case."""
+"""Rare failures of a sweep's cells: their probabilities, and ratios of the probabilities of two cases."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ FOLDER = "rare"
 
 @dataclass(frozen=True, eq=False)
 class RareFailure:
-    """Rare failure of a cell: the answer, and the members that other cases run, too; or the reason for its absence."""
+    """Rare failure of a cell: the answer and the failing members that other cases run, or the refusal."""
 
     found: RareEvent | None
     members: FailingMembers | None = None
@@ -44,7 +44,7 @@ class RareFailure:
 
     @classmethod
     def of(cls, found: RareEvent) -> RareFailure:
-        """Keep of an answer the failing members that are compared, so that it is small."""
+        """Reduce an answer to the failing members that comparisons need, so that it is small."""
         members, count = members_of(found), found.normals.shape[1]
         numbers, draws = members.u[:, :count], members.u[:, count:]
         failing = None
@@ -65,14 +65,14 @@ class RareFailure:
 
 
 def _places(u: np.ndarray, among: np.ndarray) -> np.ndarray:
-    """Index of each row (m, d) among others (k, d)."""
+    """Index of each row of `u` (m, d) among the rows (k, d)."""
     places = {row.tobytes(): i for i, row in enumerate(np.ascontiguousarray(among))}
     return np.array([places[row.tobytes()] for row in np.ascontiguousarray(u)])
 
 
 @dataclass(frozen=True)
 class RareComparison:
-    """Ratio of the failure probabilities of a second and a first case, at one point of the grid; p_holm: p by Holm."""
+    """Ratio of the failure probabilities of a second and a first case at a point; p_holm: p corrected by Holm."""
 
     first: str
     second: str
@@ -93,7 +93,7 @@ class RareComparison:
 
 @dataclass(eq=False)
 class RareFailures:
-    """The rare failures of all cells that ask for them; folder: of the sweep, None for memory."""
+    """The rare failures of all cells that request them; folder: folder of the sweep, None to keep them in memory."""
 
     setup: Setup
     success: Success
@@ -117,7 +117,7 @@ class RareFailures:
 
     @staticmethod
     def asked(case: Any) -> dict[str, Any]:
-        """The arguments of `rare_event` that a case may give, its own or the defaults; empty where it does not ask."""
+        """Arguments of `rare_event` for a case, its own or the defaults; empty if the case does not request it."""
         rare = getattr(case, "rare", None)
         if not rare:
             return {}
@@ -125,7 +125,7 @@ class RareFailures:
         return {name: defaults[name].default for name in RARE} | (dict(rare) if isinstance(rare, Mapping) else {})
 
     def of(self, cell: SweepCell) -> RareFailure | None:
-        """Rare failure of a cell; None where none was requested."""
+        """Rare failure of a cell; None if none was requested."""
         return self._answers.get(self._key(cell))
 
     def _key(self, cell: SweepCell) -> str:
@@ -134,9 +134,9 @@ class RareFailures:
     def run(
         self, cell: SweepCell, lasting: bool, progress: Callable[[float], None] | None, execution: Mapping[str, Any]
     ) -> None:
-        """Find the probability that a member of a cell fails, or read it where it is known.
+        """Estimate the probability that a member of a cell fails, or read it if it is stored.
 
-        lasting: whether files keep it. execution: threads, executor and scheduler.
+        lasting: True if it is stored in files. execution: threads, executor and scheduler.
         """
         key, asked = self._key(cell), self.asked(cell.case)
         answer = self._read(key) if lasting else None
@@ -158,13 +158,13 @@ class RareFailures:
         return {**self.setup.settings, "threads": self.threads}
 
     def limit(self, cell: SweepCell) -> VehicleLimit:
-        """The limit of a cell, above 0 where a member fails."""
+        """The limit function of a cell, positive if a member fails."""
         assert cell.fleet is not None
         condition = failing_of(self.success, self.setup.metrics, cell.fleet.scene)
         return VehicleLimit(cell.fleet, condition, self._settings())
 
     def compare(self, pairs: Sequence[tuple[SweepCell, SweepCell]]) -> list[RareComparison]:
-        """Compare pairs of cells, where both are known; p is corrected for their number by Holm."""
+        """Compare pairs of cells whose answers are both known; Holm's method corrects p for their number."""
         rows, limits = list[RareComparison](), dict[str, VehicleLimit]()
         for first, second in pairs:
             if first.index == second.index or (a := self._found(first)) is None or (b := self._found(second)) is None:
@@ -177,12 +177,12 @@ class RareFailures:
                 for row, p in zip(rows, levels, strict=True)]  # fmt: skip
 
     def _found(self, cell: SweepCell) -> RareEvent | None:
-        """The answer of a cell; None where there is none."""
+        """The answer of a cell; None if there is none."""
         answer = self.of(cell)
         return None if answer is None else answer.found
 
     def _share(self, first: SweepCell, second: SweepCell, limits: dict[str, VehicleLimit]) -> Share:
-        """The part of a cell's failing members that fail in another cell, too; limits: that were made before, by key."""
+        """Fraction of a cell's failing members that also fail in another cell; limits: limit functions by key."""
         keys = self._key(first), self._key(second)
         if keys not in self._shares:
             for cell in (first, second):
@@ -198,7 +198,7 @@ class RareFailures:
         return self.folder / FOLDER / f"{key}.npz"
 
     def _write(self, key: str, answer: RareFailure) -> None:
-        """Write an answer; the file is there whole or not at all."""
+        """Write an answer; a file is never partly written."""
         if self.folder is None or answer.found is None or answer.members is None:
             return
         # No file holds times: they differ from run to run, where all else is the same to the byte.
@@ -213,7 +213,7 @@ class RareFailures:
                   self.folder)  # fmt: skip
 
     def _read(self, key: str) -> RareFailure | None:
-        """An answer of a file; None where there is none, or none that is whole and of this cell."""
+        """Read an answer from a file; None if the file is missing, damaged or of another cell."""
         if self.folder is None:
             return None
         try:

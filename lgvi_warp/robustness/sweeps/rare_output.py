@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Output of a sweep on rare failures: records, words, and their provenance."""
+"""Output of a sweep on rare failures: records, texts, and their provenance."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from lgvi_warp.uncertainty.rare.answer import ESTIMATORS
 
 
 def rare_against_baseline(sweep: SweepTable) -> list[RareComparison]:
-    """The comparisons of the rare failures of all other cases with that of the baseline."""
+    """The comparisons of the rare failures of all other cases with the baseline's."""
     if sweep.rares is None:
         return []
     rivals = [case for case in sweep.cases if case != sweep.baseline]
@@ -24,7 +24,7 @@ def rare_against_baseline(sweep: SweepTable) -> list[RareComparison]:
 
 
 def rare_rows(sweep: SweepTable) -> list[dict[str, Any]]:
-    """The rare failures as records: probabilities, what they took, the likeliest failing member, what is moved."""
+    """The rare failures as records: probability, number of runs, likeliest failing member, and shifted inputs."""
     rows = []
     for cell in sweep.cells:
         if sweep.rares is None or (answer := sweep.rares.of(cell)) is None:
@@ -48,7 +48,7 @@ def rare_rows(sweep: SweepTable) -> list[dict[str, Any]]:
 
 
 def provenance_of_rare(sweep: SweepTable, cell: SweepCell) -> dict[str, Any]:
-    """Content of a sweep's file on a cell's rare failure; empty where none was requested."""
+    """Content of a sweep's file on a cell's rare failure; empty if none was requested."""
     if sweep.rares is None or (answer := sweep.rares.of(cell)) is None:
         return {}
     said: dict[str, Any] = {"asked": sweep.rares.asked(cell.case), "refused": answer.refused}
@@ -61,7 +61,7 @@ def provenance_of_rare(sweep: SweepTable, cell: SweepCell) -> dict[str, Any]:
 
 
 def rare_lines(sweep: SweepTable) -> list[str]:
-    """The rare failures in words, and how many times as often others fail as the baseline."""
+    """Lines of text on the rare failures, and on the ratios of other cases' probabilities to the baseline's."""
     lines = []
     for cell in sweep.cells:
         if sweep.rares is None or (answer := sweep.rares.of(cell)) is None:
@@ -96,7 +96,7 @@ def _has_answer(sweep: SweepTable, cell: Any) -> bool:
 
 
 def rare_refused(sweep: SweepTable) -> bool:
-    """Whether rare failures were asked for, and there is none."""
+    """True if rare failures were requested, but there is no answer."""
     if sweep.rares is None:
         return False
     answers = [answer for cell in sweep.cells if (answer := sweep.rares.of(cell)) is not None]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Outcome of one case at one point of the grid, member by member, in memory or in a file that a resumed sweep finds."""
+"""Outcomes of the members for one case at one point of the grid, in memory or in a file for a resumed sweep."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ FOLDER = "cells"
 
 @dataclass(frozen=True, eq=False)
 class Record:
-    """Outcome of a cell's members: status (n,) of `Status`, and metrics (n,) by name; or why it was refused."""
+    """Outcomes of a cell's members: status (n,) of `Status`, and metrics, name -> (n,); or the refusal."""
 
     status: np.ndarray
     numbers: Mapping[str, np.ndarray]
@@ -36,7 +36,7 @@ class Record:
         return cls(np.zeros(0, np.uint8), {}, (), text)
 
     def save(self, path: Path, root: Path) -> None:
-        """Write the record; the file is there whole or not at all, and the same record has the same bytes."""
+        """Write the record; a file is never partly written, and the same record gives the same bytes."""
         place_of(path, root).parent.mkdir(parents=True, exist_ok=True)
         names = list(self.numbers)
         table = np.array([self.numbers[name] for name in names], np.float64).reshape(len(names), len(self.status))
@@ -47,7 +47,7 @@ class Record:
 
     @classmethod
     def load(cls, path: Path, metrics: Sequence[str], members: int) -> Record | None:
-        """The record of a file; None where there is none, or none that is whole and of this cell."""
+        """Read a record from a file; None if the file is missing, damaged or of another cell."""
         try:
             arrays = of_npz(path)
             words = parsed(arrays["words"].tobytes())
@@ -68,14 +68,14 @@ class Record:
 def _checksum(
     path: Path, metrics: Sequence[str], messages: Sequence[str], status: np.ndarray, table: np.ndarray
 ) -> int:
-    """The checksum of a record, and of the cell that it is of."""
+    """The checksum of a record and of its cell."""
     words = json.dumps([path.name, list(metrics), list(messages)]).encode()
     return zlib.crc32(table.tobytes(), zlib.crc32(status.tobytes(), zlib.crc32(words)))
 
 
 @dataclass
 class Records:
-    """The records of all cells, in the folder of a sweep; None: in memory."""
+    """The records of all cells, in the folder of a sweep; folder None: in memory."""
 
     folder: Path | None = None
     metrics: Sequence[str] = ()
@@ -83,25 +83,25 @@ class Records:
     _kept: dict[str, Record] = field(default_factory=dict)
 
     def check(self) -> None:
-        """Look at what a folder holds already, before anything is run."""
+        """Check the files that the folder already holds, before anything is run."""
         if self.folder is not None and (cells := inside(self.folder, FOLDER)).is_dir():
             for name in os.listdir(cells):
                 place_of(self.folder / FOLDER / name, self.folder)
 
     def __getitem__(self, key: str) -> Record:
-        """The record of a key, which there must be."""
+        """The record of a key; it must exist."""
         record = self.get(key)
         assert record is not None
         return record
 
     def get(self, key: str) -> Record | None:
-        """The record of a key; None where there is none."""
+        """The record of a key; None if there is none."""
         if key in self._kept or self.folder is None:
             return self._kept.get(key)
         return Record.load(self.path(key), self.metrics, self.members)
 
     def put(self, key: str, record: Record, lasting: bool = True) -> None:
-        """Keep a record. Refusals stay in memory: what a case lacks may be mended before the sweep goes on."""
+        """Store a record. Refusals stay only in memory: their cause may be removed before the sweep continues."""
         if self.folder is None or record.refused or not lasting:
             self._kept[key] = record
         else:

@@ -42,7 +42,7 @@ END = "time_to_failure"
 
 @dataclass(frozen=True)
 class Setup:
-    """Runs to make: cells and the settings of their runs."""
+    """The planned runs of a sweep: cells and the settings of their runs."""
 
     scene: Scene
     cases: tuple[Case, ...]
@@ -64,7 +64,7 @@ class Setup:
         return {name: values[0] for name, values in self.axes.items()}
 
     def fleet(self, case: Case, point: Mapping[str, Any]) -> tuple[Ensemble, list[str]]:
-        """The members of a cell, and names of what does not vary in it."""
+        """The members of a cell, and names of quantities that do not vary in it."""
         scene = case.of(self.scene).with_numbers(point)
         numbers = {**case.set, **point}
         if isinstance(case.vehicle, Mapping):
@@ -82,26 +82,26 @@ class Setup:
                        "settings": self.settings, "versions": versions})  # fmt: skip
 
     def functions(self, fleet: Ensemble) -> dict[str, Own]:
-        """The user's functions that a cell's numbers depend on, by their place."""
+        """The user's functions on which a cell's numbers depend, by their place."""
         return functions_of(fleet, self.metrics.values())
 
     def unknown(self, fleet: Ensemble) -> list[str]:
-        """The places of functions that another call cannot tell from others."""
+        """The places of functions that have no identity, so that another call cannot recognise them."""
         functions = self.functions(fleet).items()
         return [place for place, function in functions if self.identities.name(function)[0] == UNKNOWN]
 
     def note_functions(self) -> None:
-        """Look at the functions of all cases before any of them runs, since what they hold may change as they run."""
+        """Identify the functions of all cases before any case runs, since their contents may change during runs."""
         for case in self.cases:
             with contextlib.suppress(SceneError):  # the case will say so itself
                 self.key(self.fleet(case, self.first_point)[0])
 
     def kept(self, fleet: Ensemble) -> dict[str, Any]:
-        """The arguments of `solve` for what a run keeps: metrics alone, all of them at ticks."""
+        """Arguments of `solve` for a run that stores only metrics, all of them at ticks."""
         return kept(self.metrics, fleet.scene.controller)
 
     def run(self, fleet: Ensemble, *, simulate: Callable[..., Any] = solve, **more: Any) -> Record:
-        """Run a cell, by `solve` or what stands for it, with further arguments of it."""
+        """Run a cell by `solve`, or by a function with the same arguments; more: further arguments."""
         faults = Faults()
         check_wanted(faults, "metrics", self.metrics, fleet.scene.controller)
         faults.raise_if_any()
@@ -112,7 +112,7 @@ class Setup:
 
 @dataclass(frozen=True, eq=False)
 class SweepCell:
-    """A case at a point of the grid, and its members: None where it was refused before there were any."""
+    """A case at a point of the grid, and its members; None if it was refused before members were drawn."""
 
     index: int
     case: Case
@@ -131,7 +131,7 @@ class SweepCell:
 def setup_of(
     scene: Any, cases: Any, grid: Any, vary: Any, members: Any, seed: Any, sampling: Any, metrics: Any,
     settings: Mapping[str, Any], rare: Any = None, *, predict: Callable[..., Prediction] = predict) -> Setup:  # fmt: skip
-    """Runs that a sweep would make; `settings` are those of solve, all others as in `sweep`."""
+    """Plan the runs of a sweep; `settings` are arguments of solve, all others are as in `sweep`."""
     faults = Faults()
     base, together = _base(scene, vary)
     parts: dict[str, Any] = {"cases": (), "axes": {}, "metrics": {}}
@@ -161,7 +161,7 @@ def setup_of(
 
 
 def too_many_text(setup: Setup, count: int, *, predict: Callable[..., Prediction] = predict) -> str:
-    """Problem of so many cells: the time that they would take."""
+    """Text of a problem: `count` cells are too many, with the time that they would take."""
     try:
         prediction = _prediction(setup, None, predict)
     except SceneError:
@@ -195,7 +195,7 @@ def plan_text(setup: Setup, threads: int | None = None, *, predict: Callable[...
 def _fleet(
     scene: Any, members: Any, seed: Any, sampling: Any, vary: Mapping[Any, Any], cases: Sequence[Case]
 ) -> Ensemble:
-    """The members of the sweep, of its base scene; what of `vary` only some case has does not vary in it."""
+    """The members of the sweep's base scene; entries of `vary` that exist only in some cases do not vary in it."""
     base, known = scene.scene, known_names(scene.scene)
     elsewhere = [name for name in vary if any(target.name not in known for target in variations.targets(name))]
     if elsewhere:
@@ -211,7 +211,7 @@ def _fleet(
 
 
 def _base(scene: Any, vary: Any) -> tuple[Ensemble, dict[Any, Any]]:
-    """The ensemble that a sweep starts from, and all that varies."""
+    """The base ensemble of a sweep, and everything that varies."""
     if isinstance(scene, str | os.PathLike):
         scene = Scene.load(scene)
     if isinstance(scene, Scene):
@@ -228,7 +228,7 @@ def _base(scene: Any, vary: Any) -> tuple[Ensemble, dict[Any, Any]]:
 
 
 def electrical(entries: Any, scene: Any) -> Any:
-    """The metrics, "energy" as what is used where the scene keeps an account of it, and not as mechanical work."""
+    """The metrics; "energy" becomes the electrical energy if the scene accounts for it, instead of mechanical work."""
     if (listed := items_of(entries)) is None:
         return entries
     accounted = any(term.accounts for term in scene.terms)
@@ -236,7 +236,7 @@ def electrical(entries: Any, scene: Any) -> Any:
 
 
 def metrics_of(entries: Any) -> dict[str, Statistic]:
-    """Metrics by name, each with the number of every member; "time_to_failure" is added."""
+    """Metrics by name, each with one number of every member; "time_to_failure" is added."""
     if (listed := items_of(entries)) is None:
         raise refusal("metrics", entries, "is not a list", 'give ["overshoot depth", lw.metrics.IAE("heading")]')
     faults, metrics = Faults(), dict[str, Statistic]()
@@ -254,7 +254,7 @@ def metrics_of(entries: Any) -> dict[str, Statistic]:
 def rerun_members_of(
     setup: Setup, cell: SweepCell, indices: Sequence[int], save: SaveAt | None, threads: int | None
 ) -> Result:
-    """Run some members of a cell alone, with the bits that they had in it; save: None for what the scene says."""
+    """Run only some members of a cell again, with bit-identical results; save: None for the scene's samples."""
     from lgvi_warp.engine.keepers.observation import Observation
     from lgvi_warp.runs.request import Request
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A sweep in words: cells that are alike once, and large sweeps in ten lines."""
+"""Text of a sweep: identical cells are listed once, and large sweeps get ten lines."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def against_baseline(sweep: Sweep) -> list[PairedComparison]:
 
 
 def summary(sweep: Sweep) -> str:
-    """The sweep in words, as Markdown."""
+    """Summary of the sweep as Markdown."""
     size = f"{sweep.members_count:,} members, the same in {len(sweep.cells)} cells"
     lines = ["# Sweep", "", f"{size}; intervals at {sweep.confidence:.0%}.", ""]
     kind = sweep.setup.members.sampling.kind
@@ -53,7 +53,7 @@ def summary(sweep: Sweep) -> str:
 
 
 def ends_of(sweep: SweepTable) -> tuple[list[SweepCell], list[SweepCell]]:
-    """The cells in which most members pass, and those in which fewest do; both empty where none ran."""
+    """The cells with the most and with the fewest passing members; both empty if no cell ran."""
     counts = {cell.index: int(sweep.passed(cell).sum()) for cell in sweep.cells if not sweep.record(cell).refused}
     ends = (max(counts.values(), default=0), min(counts.values(), default=0))
     best, worst = ([cell for cell in sweep.cells if counts.get(cell.index) == end] for end in ends)
@@ -82,7 +82,7 @@ def _share(sweep: SweepTable, cell: SweepCell) -> str:
 
 
 def _place(sweep: SweepTable, cells: Sequence[SweepCell]) -> str:
-    """Cases and points of cells, "soft, kp 0.2, delay 1 or 2 s", of axes with several values."""
+    """Text of cases and points of cells, such as "soft, kp 0.2, delay 1 or 2 s", for axes with several values."""
     axes = {name: values for name, values in sweep.setup.axes.items() if len(values) > 1}
     units = {name: f" {unit}" * (unit != "1") for name, unit in units_of_numbers(sweep.setup.scene, axes).items()}
     cases = list(dict.fromkeys(cell.case.name for cell in cells)) if len(sweep.cases) > 1 or not axes else []
@@ -96,13 +96,13 @@ def _place(sweep: SweepTable, cells: Sequence[SweepCell]) -> str:
 
 
 def _either(texts: Sequence[str], most: int = MOST_NAMED) -> str:
-    """Alternatives, a few by name."""
+    """Text of alternatives; only a few are named."""
     more = [f"{len(texts) - most:,} more"] if len(texts) > most else []
     return " or ".join([*texts[:most], *more])
 
 
 def _above_surface(sweep: Sweep) -> list[str]:
-    """Lines on the cells whose members rise above the surface without a term or event for it."""
+    """Lines on cells whose members rise above the surface without a term or an event for it."""
     found = [
         (cell.name, text) for cell in sweep.cells for text in sweep.record(cell).messages if text.startswith(RISEN)
     ]
@@ -115,7 +115,7 @@ def _above_surface(sweep: Sweep) -> list[str]:
 
 
 def _in_full(sweep: Sweep) -> list[str]:
-    """Lines about all cells, those that are alike once."""
+    """Lines about all cells; identical cells are listed once."""
     groups = alike(sweep)
     lines = [f"- {names_of(cells)}: {_cell_text(sweep, cells[0])}" for cells in groups]
     if len(sweep.cases) > 1:
@@ -138,7 +138,7 @@ def _in_full(sweep: Sweep) -> list[str]:
 
 
 def _brief(sweep: Sweep) -> list[str]:
-    """Ten lines about many cells: cases by rank, causes, the worst members; tables have the rest."""
+    """Ten lines about many cells: cases by rank, causes, and the worst members; the tables have the rest."""
     groups = alike(sweep)
     same = len(sweep.cells) - len(groups)
     ranked = {row["case"]: row for row in sweep.ranking()}
@@ -166,7 +166,7 @@ def _brief(sweep: Sweep) -> list[str]:
 
 
 def alike(sweep: SweepTable) -> list[list[SweepCell]]:
-    """The cells in groups whose members showed the same, to the bit, or that were refused for the same reason."""
+    """Groups of cells whose results are bit-identical, or that were refused for the same reason."""
     groups: dict[Any, list[SweepCell]] = {}
     for cell in sweep.cells:
         record = sweep.record(cell)
@@ -176,7 +176,7 @@ def alike(sweep: SweepTable) -> list[list[SweepCell]]:
 
 
 def names_of(cells: Sequence[SweepCell]) -> str:
-    """Cases and points of cells, as text."""
+    """Text of the cases and points of cells."""
     points: dict[str, list[Mapping[str, Any]]] = {}
     for cell in cells:
         points.setdefault(cell.case.name, []).append(cell.point)
@@ -184,7 +184,7 @@ def names_of(cells: Sequence[SweepCell]) -> str:
 
 
 def _at(points: Sequence[Mapping[str, Any]]) -> str:
-    """Text of the place of points of the grid: " at a = 1 or 2, b = 3"; "" without a grid."""
+    """Text of points of the grid, such as " at a = 1 or 2, b = 3"; "" without a grid."""
     if not points or not points[0]:
         return ""
     values = {name: list(dict.fromkeys(str(point[name]) for point in points)) for name in points[0]}
@@ -199,7 +199,7 @@ def _rank_text(row: Mapping[str, Any]) -> str:
 
 
 def _tally(rows: Sequence[PairedComparison], baseline: str) -> str:
-    """At how many points of the grid a case is better than the baseline, and so on; "" for the baseline."""
+    """Text of the numbers of grid points at which a case is better or worse than the baseline; "" for the baseline."""
     if not rows:
         return ""
     words = Counter(row.verdict or ("better" if row.difference.value > 0.0 else "worse") if row.real or row.verdict
@@ -209,7 +209,7 @@ def _tally(rows: Sequence[PairedComparison], baseline: str) -> str:
 
 
 def _worst_texts(sweep: Sweep, count: int, groups: Sequence[Sequence[SweepCell]]) -> Iterable[str]:
-    """The worst members; of cells that are alike, those of the first."""
+    """Texts of the worst members; of identical cells, only the first is used."""
     again = {cell.index for cells in groups for cell in cells[1:]}
     rows = sweep.worst(count * (1 + len(again)))
     cells = (sweep.cell(row["case"], {name: row[name] for name in sweep.setup.axes}) for row in rows)
@@ -219,14 +219,14 @@ def _worst_texts(sweep: Sweep, count: int, groups: Sequence[Sequence[SweepCell]]
 
 
 def _real_causes(sweep: Sweep, cell: SweepCell) -> list[dict[str, Any]]:
-    """The inputs that really explain success in a cell."""
+    """The inputs that significantly explain success in a cell."""
     if sweep.record(cell).refused:
         return []
     return [row for row in sweep.causes(cell.case.name, cell.point) if row["p"] < 1.0 - sweep.confidence]
 
 
 def _causes_text(sweep: Sweep, cell: SweepCell) -> str:
-    """The inputs that really explain success in a cell; "" for none."""
+    """Text of the inputs that significantly explain success in a cell; "" for none."""
     texts = []
     for row in _real_causes(sweep, cell)[:3]:
         medians = f"median {row['median_failed']:.4g} where it fails, {row['median_passed']:.4g} where it passes"
@@ -235,7 +235,7 @@ def _causes_text(sweep: Sweep, cell: SweepCell) -> str:
 
 
 def _causes_of_all(sweep: Sweep, groups: Sequence[Sequence[SweepCell]]) -> list[str]:
-    """The inputs that really explain success in most cells, and where each explains most."""
+    """Texts of the inputs that explain success in the most cells, and the cell where each explains most."""
     found: dict[str, list[tuple[float, int]]] = {}
     for cells in groups:
         for row in _real_causes(sweep, cells[0]):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`sweep`: cases of a closed loop at all points of a grid, on the same members."""
+"""`sweep`: run cases of a closed loop at all points of a grid, on the same members."""
 
 from __future__ import annotations
 
@@ -57,47 +57,49 @@ def sweep(
 ) -> Sweep:
     """Compare controller designs on the same members: success rate, ranking, worst members.
 
-    All cells have the same vehicles, starts, seas, sensor noise and faults: what is drawn depends on seed, member and name
-    alone. Numbers that a case sets, and numbers that it does not have, do not vary in it. Cells that differ in numbers
-    share a kernel. A case that is refused or does not compile is noted, and the others go on.
+    A cell is a case at a point of the grid. All cells have the same vehicles, starts, seas, sensor noise and faults:
+    random numbers depend only on seed, member and name. Numbers that a case sets, and numbers that it does not have, do
+    not vary in it. Cells that differ only in numbers share a kernel. If a case is refused or does not compile, this is
+    recorded, and the others continue.
 
-    With `out`, memory holds the numbers of one cell at a time, 8 bytes for each member and metric; without `out`, of all
-    cells.
+    With `out`, memory holds the numbers of one cell at a time, 8 bytes for each member and metric; else of all cells.
 
     Args:
-        scene: The scene, the path of a scene file, or an Ensemble whose scene, members, seed, vary and sampling are taken.
-        cases: Tables of `name`, `set` (numbers by name), `replace` (lists of parts, such as "laws"), `vehicle` (another one,
-            or numbers of it) and `scene` (another one); or {name: numbers that it sets}. Default: the scene alone.
-        grid: Name of a number -> its values: every case is run at all combinations. By default no grid.
-        vary: Distributions beside those of the scene, as for Ensemble; they replace those of the same name.
-        members: Number of members of every cell; default those of the scene.
-        seed: Seed of the members; default that of the scene.
-        sampling: As for Ensemble; default that of the scene.
-        metrics: One number of each member: lw.metrics.Overshoot("depth"), a table {"type": "iae", "of": "heading"}, "iae
-            heading", or an expression over the path, "max(norm(demand))". "time_to_failure" is always among them.
-        success: What a member must fulfil: {"status": "ok", "overshoot depth": {"below": 1.0}}. Default: reach the end.
-        baseline: Name of the case that others are compared with; default the first one.
+        scene: The scene, the path of a scene file, or an Ensemble, whose scene, members, seed, vary and sampling are used.
+        cases: Cases, or tables with `name`, `set` (numbers by name), `replace` (lists of parts, such as "laws"),
+            `vehicle` (another vehicle, or some of its numbers) and `scene` (another scene); or {name of a case: numbers
+            that it sets}. Default: the scene alone.
+        grid: Name of a number -> its values; every case is run at all combinations. By default no grid.
+        vary: Distributions in addition to the scene's, as for Ensemble; they replace those of the same name.
+        members: Number of members of every cell; default the scene's.
+        seed: Seed of the members; default the scene's.
+        sampling: As for Ensemble; default the scene's.
+        metrics: Metrics, each one number of each member: lw.metrics.Overshoot("depth"), a table {"type": "iae", "of":
+            "heading"}, "iae heading", or an expression over the path, "max(norm(demand))". "time_to_failure" is added.
+        success: Conditions of success: {"status": "ok", "overshoot depth": {"below": 1.0}}. Default: it reaches the end.
+        baseline: Name of the case that others are compared with; default the first case.
         confidence: Confidence level of all intervals, between 0 and 1; by default 0.95.
-        interval: Of probabilities: "wilson" (default) or "clopper_pearson".
-        matters: The least difference that matters: of success in points, 1.0; and of metrics in their units, {"success": 1.0,
-            "overshoot depth": 0.1}. Comparisons then say better or worse by more than that, equivalent where the interval
-            lies within it, or undecided. A smaller metric is better, unless success limits it from below only. By default
-            None.
-        rare: True: estimate the probability that a member does not pass, however small, by lw.rare_event, in every cell
-            whose case does not set `rare`; or some arguments of it, {"relative_error": 0.2, "cheaper": [{"h": 0.1}],
-            "most": 200_000}. Two cells are compared by the failing members of both. None (default): only in cells whose
-            case sets it.
-        out: Folder. What is finished is kept there, so that the same call goes on after a stop, with the same bytes; cells
-            whose numbers, metrics, functions or settings have changed run anew. Your own functions are identified by their
-            code and what it refers to; or by the `version` of lw.control.Callback and lw.metrics.CustomMetric, if given.
+        interval: Kind of the intervals of probabilities: "wilson" (default) or "clopper_pearson".
+        matters: The smallest difference that matters: of success in percentage points, such as 1.0; or also of metrics
+            in their units, {"success": 1.0, "overshoot depth": 0.1}. The verdict of a comparison is then better or
+            worse (by more than this), equivalent (the interval lies within it) or undecided. A smaller metric is
+            better, unless success limits it from below only. By default None.
+        rare: True estimates the probability that a member does not pass, even if it is very small, by lw.rare_event, in
+            every cell whose case does not set `rare`; or a dict with some arguments of lw.rare_event,
+            {"relative_error": 0.2, "cheaper": [{"h": 0.1}], "most": 200_000}. Two cells are compared by the failing
+            members of both. None (default): only in cells whose case sets it.
+        out: Folder. Finished cells are stored there, so that the same call continues after a stop, with the same bytes.
+            Cells whose numbers, metrics, functions or settings have changed are run again. Your own functions are
+            identified by their code and the objects it refers to; or by the `version` of lw.control.Callback and
+            lw.metrics.CustomMetric, if given.
         threads: As of solve.
         executor: As of solve; default "threads".
         scheduler: As of solve; default None.
-        progress: As of solve, of all cells together; None, the default: nothing is shown.
+        progress: As of solve, over all cells; None, the default: nothing is shown.
         **settings: Further arguments of solve, such as method, h, t1, dtype.
 
     Returns:
-        The sweep: success, comparisons, ranks, the worst members and their causes, as tables, files and words.
+        The sweep: success, comparisons, ranks, the worst members and their causes, as tables, files and texts.
 
     Raises:
         SceneError: If arguments are at fault; the message names every fault.
@@ -164,7 +166,7 @@ def swept(
 
 
 def _run_rare(rares: RareFailures, answer: Sweep, progress: Any, total: int, execution: Mapping[str, Any]) -> None:
-    """Find the rare failures that are asked for, and compare them with those of the baseline."""
+    """Find the requested rare failures, and compare them with the baseline's."""
     asking = [cell for cell in answer.cells if cell.case.rare and not answer.record(cell).refused]
     done = total - RARE_PARTS * len(asking)
     for i, cell in enumerate(asking):
@@ -180,7 +182,7 @@ def _run_rare(rares: RareFailures, answer: Sweep, progress: Any, total: int, exe
 def _run(
     setup: Setup, records: Records, progress: Any, total: int, execution: Mapping[str, Any]
 ) -> Iterator[SweepCell]:
-    """Run the cells that are not recorded yet, and note those that are refused; total: parts of the progress in all."""
+    """Run the cells without a record, and record those that are refused; total: number of parts of the progress."""
     setup.note_functions()
     for i, (case, point) in enumerate(setup.cells):
         share = progress and (lambda part, i=i: progress((i + part) / total))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Cells of a sweep with what their members showed: lookups, success with its intervals, what varies, and a table of all."""
+"""Cells of a sweep with their members' results: lookups, success with its intervals, inputs that vary, and a table."""
 
 from __future__ import annotations
 
@@ -72,10 +72,10 @@ class SweepTable:
         """Return the unit of a metric.
 
         Args:
-            metric: its name, one of `metrics`.
+            metric: name of the metric, one of `metrics`.
 
         Returns:
-            The unit as text, such as "rad s"; "1" for none.
+            The unit as text, such as "rad s"; "1" if it has none.
 
         Raises:
             SceneError: there is no such metric.
@@ -86,13 +86,13 @@ class SweepTable:
         return str(getattr(statistic, "unit", statistic.quantity.unit))
 
     def record(self, cell: SweepCell) -> Record:
-        """Return what the members of a cell showed.
+        """Return the results of the members of a cell.
 
         Args:
             cell: one of `cells`.
 
         Returns:
-            The record: `status` (n,), `numbers` (n,) by metric, `messages`, and `refused`, "" where the cell has run.
+            The record: `status` (n,), `numbers`, metric -> (n,), `messages`, and `refused`, "" for a cell that has run.
         """
         return self.records[cell.key]
 
@@ -100,8 +100,8 @@ class SweepTable:
         """Return the cells of a case.
 
         Args:
-            case: its name.
-            at: values of the grid by name that they have; None (default) for all.
+            case: name of the case.
+            at: values of the grid by name that select cells; None (default) for all.
 
         Returns:
             The cells, in the order of the grid.
@@ -124,14 +124,14 @@ class SweepTable:
         """Return the one cell of a case at a point of the grid, which has run.
 
         Args:
-            case: its name.
-            at: values of all axes of the grid by name; may be left out where there is no grid.
+            case: name of the case.
+            at: values of all axes of the grid by name; may be left out if there is no grid.
 
         Returns:
             The cell.
 
         Raises:
-            SceneError: there is no such cell, several, or it was refused.
+            SceneError: there is no such cell, there are several, or it was refused.
         """
         cells = self.cells_of(case, at)
         if len(cells) != 1:
@@ -143,27 +143,27 @@ class SweepTable:
         return cells[0]
 
     def passed(self, cell: SweepCell) -> np.ndarray:
-        """Return which members of a cell pass.
+        """Return the mask of members of a cell that pass.
 
         Args:
             cell: one of `cells`.
 
         Returns:
-            (n,) of bool; one that failed never passes.
+            Mask (n,) of bool; a member that failed never passes.
         """
         record = self.record(cell)
         return self.conditions.passed(record.status, record.numbers)
 
     def values(self, case: str, metric: str, at: Mapping[str, Any] | None = None) -> np.ndarray:
-        """Return a metric of all members.
+        """Return a metric of all members of a cell.
 
         Args:
             case: name of the case.
             metric: name of the metric.
-            at: values of the grid by name; may be left out where there is no grid.
+            at: values of the grid by name; may be left out if there is no grid.
 
         Returns:
-            (n,), in the unit of the metric; NaN where a member has none.
+            Values (n,) in the unit of the metric; NaN if a member has none.
 
         Raises:
             SceneError: there is no such case, point or metric.
@@ -177,10 +177,10 @@ class SweepTable:
 
         Args:
             case: name of the case.
-            at: values of the grid by name; may be left out where there is no grid.
+            at: values of the grid by name; may be left out if there is no grid.
 
         Returns:
-            (value, lower, upper), between 0 and 1: the share of the members, and its interval.
+            (value, lower, upper), between 0 and 1: the fraction of the members, and its confidence interval.
 
         Raises:
             SceneError: there is no such case or point, or it was refused.
@@ -193,10 +193,10 @@ class SweepTable:
         Args:
             case: name of the case.
             times: times (k,) [s].
-            at: values of the grid by name; may be left out where there is no grid.
+            at: values of the grid by name; may be left out if there is no grid.
 
         Returns:
-            (value, lower, upper) of each time, as in `success`.
+            (value, lower, upper) at each time, as in `success`.
 
         Raises:
             SceneError: there is no such case or point, or it was refused.
@@ -208,15 +208,15 @@ class SweepTable:
         return probability(int(passed.sum()), len(passed), self.confidence, self.interval)
 
     def members(self, case: str, failed: bool = True, at: Mapping[str, Any] | None = None) -> np.ndarray:
-        """Return the members that do not pass, or those that do.
+        """Return the members that do not pass, or the members that pass.
 
         Args:
             case: name of the case.
-            failed: whether those that do not pass are wanted; by default True.
-            at: values of the grid by name; may be left out where there is no grid.
+            failed: True for members that do not pass, False for members that pass; by default True.
+            at: values of the grid by name; may be left out if there is no grid.
 
         Returns:
-            Their indices, rising.
+            Indices of the members, rising.
 
         Raises:
             SceneError: there is no such case or point, or it was refused.
@@ -224,7 +224,7 @@ class SweepTable:
         return np.flatnonzero(self.passed(self.cell(case, at)) != failed)
 
     def inputs(self, cell: SweepCell, first: int = 0, stop: int | None = None) -> dict[str, np.ndarray]:
-        """Return what varies among the members of a cell.
+        """Return the inputs that vary among the members of a cell.
 
         Args:
             cell: one of `cells`, not refused.
@@ -232,7 +232,7 @@ class SweepTable:
             stop: member after the last; None (default) for all.
 
         Returns:
-            (stop - first,) by name, one number a name, in the order of `vary`.
+            Values by name, each (stop - first,), in the order of `vary`; every name stands for one number.
         """
         assert cell.fleet is not None
         fleet, stop = cell.fleet, cell.fleet.members if stop is None else stop
@@ -252,9 +252,9 @@ class SweepTable:
         return numbers
 
     def rows(self) -> list[dict[str, Any]]:
-        """Return success with its interval, and mean, spread and quantiles of each metric.
+        """Return success with its interval, and mean, standard deviation and quantiles of each metric.
 
-        Metrics are over members that did not fail and whose number is finite; `missing` counts the others.
+        Metrics are taken over members that did not fail and whose number is finite; `missing` counts the others.
 
         Returns:
             One record for each cell: case, point, refused, members, failed, stopped, passed, success and metrics by name.
@@ -281,7 +281,7 @@ class SweepTable:
         return row | self._rare_row(cell)
 
     def _rare_row(self, cell: SweepCell) -> dict[str, Any]:
-        """Columns on a cell's rare failure, where it was requested."""
+        """Columns on a cell's rare failure, if it was requested."""
         answer = None if self.rares is None else self.rares.of(cell)
         if answer is None:
             return {}
@@ -293,7 +293,7 @@ class SweepTable:
 
     @property
     def table(self) -> xarray.Dataset:
-        """The rows as an xarray Dataset, by case and by axes of the grid; a cell that was refused is NaN.
+        """The rows as an xarray Dataset over cases and axes of the grid; a cell that was refused is NaN.
 
         Raises:
             ImportError: xarray is not installed (extra: store).
@@ -312,5 +312,5 @@ class SweepTable:
 
 
 def coordinates(values: Sequence[Any]) -> list[Any]:
-    """Values of an axis as coordinates: numbers and texts as they are, others as texts."""
+    """Values of an axis as coordinates: numbers and texts unchanged, others as texts."""
     return [value if isinstance(value, int | float | str) else str(value) for value in values]

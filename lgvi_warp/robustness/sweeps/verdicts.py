@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whether a difference of two cases matters: better, worse, equivalent or undecided."""
+"""Verdict on a difference of two cases: better, worse, equivalent or undecided."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ VERDICTS = (BETTER, WORSE, EQUIVALENT, UNDECIDED)
 
 
 def matters_of(matters: Any, metrics: Sequence[str], success: str) -> dict[str, float]:
-    """Read the least differences that matter by name: of success in points, as a number alone is, of metrics in their units.
+    """Read the smallest differences that matter, by name; a single number is for success, in points.
 
-    success: the name of the comparison of successes. Raises SceneError.
+    success: name of the comparison of success. Raises SceneError.
     """
     if matters is None:
         return {}
@@ -34,9 +34,9 @@ def matters_of(matters: Any, metrics: Sequence[str], success: str) -> dict[str, 
 
 
 def verdict(difference: Difference, matters: float, real: bool, more_is_better: bool) -> str:
-    """Verdict on a difference beside the least that matters, in its unit.
+    """Verdict on a difference, given the smallest difference that matters, in its unit.
 
-    Equivalent: its interval lies within +-matters. Better and worse: it is real, and its interval lies beyond.
+    Equivalent: the interval lies within +-matters. Better and worse: it is significant, and its interval lies beyond.
     """
     lower, upper = difference.lower, difference.upper
     if not more_is_better:

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Choice of the members' numbers: designs of the unit cube, tables and grids.
+"""Sampling of the members' numbers: designs of the unit cube, tables and grids.
 
-A sampling gives any members by their indices, so that a member is the same in every run that contains it. Distributions turn
-the cube's levels into values (sampling/distributions). The cube's columns are in the order of the names that vary
-("environment.gravity" before "vehicle.mass"), with the entries of a quantity one after the other.
+A sampling computes any members from their indices, so a member is the same in every run that contains it. Distributions
+turn the cube's levels into values (sampling/distributions). The cube's columns are in alphabetical order of the varied
+names ("environment.gravity" before "vehicle.mass"); the entries of a quantity follow each other.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The base class of every sampling, and designs that can be drawn several times independently."""
+"""The base class of all samplings, and of designs with independent replicates."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ Drawn = dict[str, np.ndarray]
 class Sampling(Documented):
     """Arrangement of the members' points in the unit cube.
 
-    Class attributes: `kind` is the name in a scene file; `fewer` says whether a run may take only the first of the members
-    that the sampling brings.
+    Class attributes: `kind` is the name in a scene file; `fewer` is True if a run may use only the first of the members
+    that the sampling contains.
 
     Raises:
         SceneError: If a setting is wrong. The message lists every fault.
@@ -58,39 +58,39 @@ class Sampling(Documented):
         registry.add(cls.kinds, cls, "kind")
 
     def draw(self, space: Space, members: np.ndarray) -> Drawn:
-        """Levels in (0, 1) of members (n,) by key, each (n, size). Every sampling must define this."""
+        """Levels in (0, 1) of members (n,) by key, each (n, size). All samplings must define this."""
         raise TypeError(f"{type(self).__name__} is abstract")
 
     def distributions(self) -> dict[str, Any]:
-        """Distributions that the sampling itself brings, by the name of what they vary."""
+        """Distributions that the sampling itself contains, by the name of the quantity."""
         return {}
 
     def own_values(self) -> dict[str, np.ndarray]:
-        """Values (members, ...) that the sampling itself brings, by the name of what they set."""
+        """Values (members, ...) that the sampling itself contains, by the name of the quantity."""
         return {}
 
     def own_weights(self) -> np.ndarray | None:
-        """Weights of the members (members,) in statistics, of mean 1; None: all count alike."""
+        """Weights of the members (members,) in statistics, with mean 1; None for equal weights."""
         return None
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """The arrays that the sampling was given, with a row for each member, which a store keeps as arrays."""
+        """Arrays of the sampling with a row for each member, which a store keeps as arrays."""
         return {}
 
     def own_members(self, space: Space) -> int | None:
-        """The number of members that the sampling itself fixes; None where the user chooses it."""
+        """The number of members that the sampling itself fixes; None if the user chooses it."""
         return None
 
     def group_size(self, space: Space) -> int:
-        """The size of the groups in which members come; their number must be a multiple of it."""
+        """Group size: the number of members must be a multiple of it."""
         return 1
 
     def replicates_of_members(self) -> int:
-        """The number R of independent replicates of the design: member i is point i // R of replicate i mod R."""
+        """Number R of independent replicates of the design: member i is point i // R of replicate i mod R."""
         return 1
 
     def check(self, faults: Faults, space: Space, members: int) -> None:
-        """Add a fault where the number of members, or what varies, does not suit the sampling."""
+        """Add a fault if the number of members, or the varied names, do not suit the sampling."""
         fixed, group = self.own_members(space), self.group_size(space)
         if fixed is not None and self.fewer and members > fixed:
             fault = f"are more than the {fixed} of the {self.kind}"
@@ -105,21 +105,21 @@ class Sampling(Documented):
             faults.add("members", members, fault, f"give {near}")
 
     def to_dict(self) -> Any:
-        """The sampling as a scene file has it: its name, or { name: settings } where a setting differs from its default."""
+        """Convert to the form of a scene file: the name, or { name: settings } if a setting differs from its default."""
         values = {item.name: (getattr(self, item.name), item.default) for item in fields(self)}
         changed = {name: value for name, (value, default) in values.items() if value != default}
         return {self.kind: changed} if changed else self.kind
 
 
 def inside(cube: np.ndarray) -> np.ndarray:
-    """Levels clipped to the open interval (0, 1), where quantiles are finite; read-only."""
+    """Levels clipped to the open interval (0, 1), in which quantiles are finite; read-only."""
     cube = np.clip(cube, 2.0**-54, 1.0 - 2.0**-53)
     cube.setflags(write=False)
     return np.asarray(cube)
 
 
 def check_replicates(faults: Faults, replicates: Any) -> None:
-    """Add a fault where a number of replicates is no power of two from 1 to 64."""
+    """Add a fault unless a number of replicates is a power of two from 1 to 64."""
     if not is_whole(replicates, 1, MOST_REPLICATES) or replicates & (replicates - 1):
         remark = f"is not a power of two from 1 to {MOST_REPLICATES}"
         faults.add("replicates", replicates, remark, "give 8, 16, 32 or 64")
@@ -127,13 +127,14 @@ def check_replicates(faults: Faults, replicates: Any) -> None:
 
 @dataclass(frozen=True)
 class Replicated(Sampling):
-    """A design that can be drawn R times independently: member i is point i // R of replicate i mod R.
+    """A design with R independent replicates: member i is point i // R of replicate i mod R.
 
-    The replicates' estimates of a statistic are independent, and their spread gives the error of their mean, from which
-    intervals follow (L'Ecuyer, Nakayama, Owen & Tuffin 2023, Winter Simulation Conference).
+    The replicates' estimates of a statistic are independent. Their spread gives the error of their mean, and so the
+    intervals (L'Ecuyer, Nakayama, Owen & Tuffin 2023, Winter Simulation Conference).
 
     Args:
-        replicates: R, a power of two from 1 to 64, 1 by default. The number of members must be a multiple of it.
+        replicates: Number R of replicates, a power of two from 1 to 64; 1 by default. The number of members must be a
+            multiple of R.
 
     Raises:
         SceneError: If a setting is wrong. The message lists every fault.
@@ -150,7 +151,7 @@ class Replicated(Sampling):
         object.__setattr__(self, "replicates", int(R))
 
     def check_own(self, faults: Faults) -> None:
-        """Add a fault for each of the design's further settings that is wrong; by default there are none."""
+        """Add a fault for each wrong setting of a derived class; by default there are no further settings."""
 
     def replicates_of_members(self) -> int:
         return self.replicates
@@ -160,7 +161,7 @@ class Replicated(Sampling):
         return self.replicates
 
     def dealt(self, members: np.ndarray) -> Iterator[tuple[int, np.ndarray | slice, np.ndarray]]:
-        """Deal members (n,) to replicates: each one's number, which members are its own, and the indices of their points."""
+        """Assign members (n,) to replicates: number of each replicate, mask of its members, and indices of their points."""
         if self.replicates == 1:
             yield 0, slice(None), members
             return
@@ -176,9 +177,9 @@ class Replicated(Sampling):
         return space.split(levels)
 
     def points(self, space: Space, replicate: int, indices: np.ndarray) -> np.ndarray:
-        """Points (n, dimensions) of one replicate's sequence; a design without sequences overrides `draw`."""
+        """Points (n, dimensions) of a replicate's sequence; a design without sequences overrides `draw` instead."""
         raise TypeError(f"{type(self).__name__} is abstract")
 
     def name(self, replicate: int) -> str:
-        """The name of a replicate's stream of random numbers: the kind and its number, from 0; with R = 1 the kind alone."""
+        """Name of a replicate's stream of random numbers: kind and number, from 0; with R = 1 only the kind."""
         return self.kind if self.replicates == 1 else f"{self.kind} {replicate}"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Columns of numbers from a CSV file; each cell that is no number is reported with its line and column."""
+"""Columns of numbers from a CSV file; each cell without a number is reported with its line and column."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ Choose = Callable[[Faults, Sequence[str]], list[str]]
 
 
 def columns_of(faults: Faults, path: str, content: bytes, choose: Choose) -> dict[str, np.ndarray]:
-    """Columns (lines,) of a CSV file by name; {} where there is a fault.
+    """Columns (lines,) of a CSV file by name; {} if there is a fault.
 
     The names are in the first line that is neither empty nor a comment (#); every other line holds one number for each.
-    Commas, semicolons or tabs separate cells, as in the first line.
+    Commas, semicolons or tabs separate cells; the first line decides which.
     """
     rows: Any = csv.reader(())
     try:
@@ -50,7 +50,7 @@ def columns_of(faults: Faults, path: str, content: bytes, choose: Choose) -> dic
 
 
 def _lines(content: bytes) -> Iterator[str]:
-    """Every line, so that they are counted as the file has them; comments and empty lines become a bare line end."""
+    """All lines, so that line numbers match the file; comments and empty lines become bare line ends."""
     text = io.TextIOWrapper(io.BytesIO(content), "utf-8-sig")
     while line := text.readline(LONGEST_LINE):
         if len(line) == LONGEST_LINE:
@@ -59,7 +59,7 @@ def _lines(content: bytes) -> Iterator[str]:
 
 
 def _check_names(faults: Faults, path: str, line: int, names: Sequence[str], delimiter: str) -> None:
-    """Add a fault for a first line that does not hold names."""
+    """Add a fault if the first line does not contain names."""
     if not names:
         remedy = "write the names in its first line, then a line of numbers for each member"
         faults.add("file", path, "is empty", remedy)
@@ -73,7 +73,7 @@ def _check_names(faults: Faults, path: str, line: int, names: Sequence[str], del
 
 
 def _check_chosen(faults: Faults, path: str, line: int, names: Sequence[str], chosen: Sequence[str]) -> None:
-    """Add a fault where a chosen name is empty or names two columns."""
+    """Add a fault if a chosen name is empty or occurs twice."""
     counts = Counter(names)
     for name in sorted({name for name in chosen if counts[name] > 1}):
         faults.add("file", path, f"names a column twice, {name!r} (line {line})", "give each column a name of its own")
@@ -83,7 +83,7 @@ def _check_chosen(faults: Faults, path: str, line: int, names: Sequence[str], ch
 
 
 def _numbers(faults: Faults, path: str, rows: Any, names: Sequence[str], chosen: Sequence[str]) -> np.ndarray:
-    """The numbers (lines, chosen) of the lines that follow."""
+    """The numbers (lines, chosen) of the lines after the first."""
     place_of = {name: place for place, name in enumerate(names)}
     places = [place_of[name] for name in chosen]
     values, reports = array("d"), list[tuple[str, str]]()
@@ -132,7 +132,7 @@ def _faults_of_line(
 
 
 def _number(cell: str) -> float | None:
-    """The number in a cell; None where it holds none."""
+    """The number in a cell; None if there is none."""
     try:
         return float(cell)
     except ValueError:

@@ -25,14 +25,14 @@ Factors = tuple[tuple[str, tuple[int, ...]], ...]
 class Saltelli(Sampling):
     """Design for Sobol indices, in the order of SALib.sample.sobol: groups of 2 d + 2 members.
 
-    d is the number of factors: the entries that vary by themselves, and each joint distribution. A group is a point A and a
-    point B of one Sobol sequence, A with each factor of B, and B with each factor of A. Groups may be added; powers of two of
-    them are balanced. Saltelli et al. (2010), Computer Physics Communications 181.
+    d is the number of factors: the entries that vary independently, and each joint distribution. A group consists of
+    points A and B of one Sobol sequence, A with each factor of B, and B with each factor of A. Groups may be added; a
+    power of two of groups is balanced. Saltelli et al. (2010), Computer Physics Communications 181.
 
     Args:
-        second_order: Whether second-order indices follow, True by default; without them groups have d + 2 members.
-        replicates: R, the number of independently scrambled sequences, which take turns group by group; 1 by default.
-        groups: Name -> names of factors that are taken for one, "current.velocity" for all its entries; by default none.
+        second_order: True, the default, allows second-order indices; without them groups have d + 2 members.
+        replicates: Number R of independently scrambled sequences, which are used in turn, group by group; 1 by default.
+        groups: Name -> names of factors that form one factor, "current.velocity" for all its entries; by default none.
 
     Raises:
         SceneError: If a setting is wrong. The message lists every fault.
@@ -69,7 +69,7 @@ class Saltelli(Sampling):
         return content
 
     def factors(self, space: Space) -> Factors:
-        """Label and columns of each factor, a group in the place of its first member.
+        """Label and columns of each factor; a group is at the place of its first factor.
 
         Args:
             space: The cube: which names vary, with how many columns each.
@@ -105,7 +105,7 @@ class Saltelli(Sampling):
         super().check(faults, space, members)
 
     def replicate_of(self, groups: np.ndarray) -> np.ndarray:
-        """Sequence of each group.
+        """Index of the sequence of each group.
 
         Args:
             groups: Indices of groups, (n,).
@@ -128,7 +128,7 @@ class Saltelli(Sampling):
         """Columns that each member of a group takes from point B.
 
         Args:
-            space: The cube: which names vary, with how many columns each.
+            space: The cube: the varied names with their numbers of columns.
 
         Returns:
             Mask (group size, dimensions).
@@ -142,7 +142,7 @@ class Saltelli(Sampling):
 
 
 def _labels(space: Space, name: str) -> list[str]:
-    """The factors that a name means: the one of this label, or the entries of this number."""
+    """The factors for a name: the factor with this label, or the entries of this number."""
     return [label for label, _ in space.factors if label == name or label.startswith(f"{name}[")]
 
 
@@ -150,9 +150,9 @@ def _labels(space: Space, name: str) -> list[str]:
 class Morris(Sampling):
     """Design of Morris's screening (SALib.sample.morris): paths of d + 1 members, each step of which changes one factor.
 
-    Each side of the cube is divided into parts, and a member is in the middle of a part, so that distributions without bounds
-    stay finite. Paths may be added. Needs SALib (extra: uq). Morris (1991), Technometrics 33; Campolongo, Cariboni & Saltelli
-    (2007).
+    Each side of the cube is divided into parts, and a member is in the middle of a part, so that unbounded
+    distributions give finite values. Paths may be added. It needs SALib (extra: uq). Morris (1991), Technometrics 33;
+    Campolongo, Cariboni & Saltelli (2007).
 
     Args:
         levels: Number of parts of each side, even, from 4; 4 by default.
@@ -188,10 +188,10 @@ class Morris(Sampling):
         return space.split((x * (self.levels - 1) + 0.5) / self.levels)
 
     def design(self, space: Space, members: np.ndarray) -> np.ndarray:
-        """The design as SALib numbers it.
+        """The design in SALib's levels.
 
         Args:
-            space: The cube: which names vary, with how many columns each.
+            space: The cube: the varied names with their numbers of columns.
             members: Indices of the members, (n,).
 
         Returns:

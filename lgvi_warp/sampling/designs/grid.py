@@ -20,17 +20,17 @@ from lgvi_warp.sampling.distributions.basic import Choice
 
 @dataclass(frozen=True, eq=False)
 class Grid(Sampling):
-    """A full grid: every combination of the values of each name, the last name in their order fastest.
+    """A full grid: every combination of the values of all names; the last name changes fastest.
 
     Names of `vary` that the grid does not contain are drawn at random. The number of members is the number of combinations.
 
     Args:
-        axes: By name, either a list of values (of an entry such as "start.position[2]", or of the whole quantity), or a
-            number of levels: the middles of that many equally probable parts of the name's distribution in `vary`, for each
-            of its entries.
+        axes: Name -> a list of values (of an entry such as "start.position[2]", or of the whole quantity), or a number
+            of levels: the medians of this number of equally probable parts of the name's distribution in `vary`, for
+            each of its entries.
 
     Raises:
-        SceneError: If an axis is neither. The message lists every fault.
+        SceneError: If an axis is neither a list of values nor a number of levels. The message lists every fault.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -67,7 +67,7 @@ class Grid(Sampling):
         return {name: Choice(axis) for name, axis in self.axes.items() if not isinstance(axis, int | np.integer)}
 
     def _radices(self, space: Space) -> tuple[Space, list[int]]:
-        """The part of the cube that is a grid, and the number of levels of each of its columns."""
+        """The part of the cube with the grid, and the number of levels of each of its columns."""
         inner = space.of(self.axes)
         numbers = []
         for key, size in zip(inner.keys, inner.sizes, strict=True):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Latin hypercubes, added group by group."""
+"""Latin hypercubes, which are added group by group."""
 
 from __future__ import annotations
 
@@ -20,13 +20,14 @@ LARGEST_GROUP = 2**20
 
 @dataclass(frozen=True)
 class LatinHypercube(Replicated):
-    """Groups of members, each a full Latin hypercube: every column has one member in each of `group` equal parts.
+    """Groups of members, each a Latin hypercube: every column has one member in each of `group` equal parts.
 
     Members are added group by group, and names may be added. McKay, Beckman & Conover (1979); scipy.stats.qmc.LatinHypercube.
 
     Args:
-        group: Members in a hypercube, 2 to 2^20; it must be given. The number of members must be a multiple of it.
-        replicates: R, the number of hypercubes filled at once: consecutive members go to each in turn; 1 by default.
+        group: Number of members in a hypercube, 2 to 2^20; required. The number of members must be a multiple of it.
+        replicates: Number R of hypercubes that are filled together: successive members go to each in turn; 1 by
+            default.
 
     Raises:
         SceneError: If a setting is wrong. The message lists every fault.
@@ -73,7 +74,7 @@ class LatinHypercube(Replicated):
 # A block of members is within few groups: their hypercubes are cached from one block to the next.
 @functools.lru_cache(maxsize=64)
 def _hypercubes(seed: int, key: str, first: int, number: int, size: int, columns: int) -> np.ndarray:
-    """`number` hypercubes from the first on, a point of each in turn: (size * number, columns)."""
+    """Points of `number` hypercubes from `first` on, one of each in turn: (size * number, columns)."""
     from scipy.stats import qmc
 
     cubes = np.empty((size, number, columns))

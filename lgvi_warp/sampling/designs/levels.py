@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A design of the user's own: points of the unit cube."""
+"""A custom design: points of the unit cube."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from lgvi_warp.sampling.designs.space import Space
 
 @dataclass(frozen=True, eq=False)
 class UnitCubePoints(Sampling):
-    """A design of your own: points in the open unit cube, whose columns are in the order of the names.
+    """A custom design: points in the open unit cube, whose columns are in the order of the names.
 
-    `ensemble.space` says which column is which: an entry that varies by itself has one column of its name, a joint
-    distribution has several, "start.attitude 0" and so on. The number of members is that of the points; fewer members are
-    the first points.
+    `ensemble.space` lists the columns: an entry that varies independently has one column with its name; a joint
+    distribution has several, "start.attitude 0" and so on. By default, the number of members is the number of points;
+    with fewer members, the first points are used.
 
     Args:
-        points: Levels (n, dimensions) in (0, 1). Also a data frame, a mapping of columns, a structured array or an xarray
+        points: Levels (n, dimensions) in (0, 1); or a data frame, a mapping of columns, a structured array or an xarray
             Dataset with these names, in any order.
-        names: Names of an array's columns, where they are not in the order of the cube.
+        names: Names of an array's columns, if they are not in the order of the cube.
 
     Raises:
         SceneError: If points are outside the cube, or do not fit the names. The message lists every fault.
@@ -57,7 +57,7 @@ class UnitCubePoints(Sampling):
         object.__setattr__(self, "points", array)
 
     def _by_name(self, faults: Faults) -> np.ndarray | None:
-        """The named columns side by side; also keeps their names."""
+        """Concatenate the named columns, and keep their names."""
         if self.names is not None:
             faults.add("names", self.names, "are given beside points that have names", "leave them out")
         columns = columns_by_name(faults, "points", self.points)

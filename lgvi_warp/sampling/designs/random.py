@@ -15,10 +15,10 @@ from lgvi_warp.sampling.designs.space import Space
 
 @dataclass(frozen=True)
 class Random(Sampling):
-    """Independent random numbers, from the seed, the member's index and the name. Members and names may be added.
+    """Independent random numbers from the seed, the member's index and the name. Members and names may be added.
 
     It is the default of `lw.Ensemble`. The error of a mean falls with the square root of the number of members;
-    `LatinHypercube` and `Sobol` fill the cube more evenly. The numbers are those of Philox (Salmon et al. 2011).
+    `LatinHypercube` and `Sobol` fill the cube more evenly. The generator is Philox (Salmon et al. 2011).
     """
 
     kind: ClassVar[str] = "random"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Scrambled low-discrepancy sequences whose points are found directly from their indices: Sobol's and Halton's."""
+"""Scrambled low-discrepancy sequences of Sobol and Halton, whose points follow directly from their indices."""
 
 from __future__ import annotations
 
@@ -23,10 +23,11 @@ SOBOL_BITS = 32
 class Sobol(Replicated):
     """A scrambled Sobol sequence (linear matrix scramble and digital shift, scipy.stats.qmc.Sobol): member i is point i.
 
-    Members may be added; powers of two are balanced. Varying one more name changes the sequence.
+    Members may be added; powers of two of members are balanced. Varying another name changes the sequence.
 
     Args:
-        replicates: R, the number of independently scrambled sequences, which take turns member by member; 1 by default.
+        replicates: Number R of independently scrambled sequences, which are used in turn, member by member; 1 by
+            default.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -47,7 +48,8 @@ class Sobol(Replicated):
 def sobol_points(seed: int, name: str, dimensions: int, indices: np.ndarray, scramble: bool = True) -> np.ndarray:
     """Points (n, dimensions) in (0, 1) of a Sobol sequence by their indices (n,).
 
-    A point is the exclusive or of point 0 and of one number for each bit of its index, so that any point is found directly.
+    A point is the exclusive or of point 0 and one number for each set bit of its index, so any point is computed
+    directly.
     """
     if not dimensions:
         return np.empty((len(indices), 0))
@@ -63,7 +65,7 @@ def sobol_points(seed: int, name: str, dimensions: int, indices: np.ndarray, scr
 # The cache holds the tables of every replicate, for up to eight numbers of bits.
 @functools.lru_cache(maxsize=8 * MOST_REPLICATES)
 def _sobol_basis(seed: int, name: str, dimensions: int, bits: int, scramble: bool) -> np.ndarray:
-    """Point 0, and the bits that each bit of an index changes in it: (bits + 1, dimensions), as integers."""
+    """Point 0, and the bits that each bit of an index flips in it: (bits + 1, dimensions), as integers."""
     from scipy.stats import qmc
 
     engine = qmc.Sobol(dimensions, scramble=scramble, bits=SOBOL_BITS, rng=generator(seed, name))
@@ -82,10 +84,11 @@ def _sobol_basis(seed: int, name: str, dimensions: int, bits: int, scramble: boo
 class Halton(Replicated):
     """A scrambled Halton sequence (random permutations of digits, scipy.stats.qmc.Halton): member i is point i.
 
-    Any number of members may be added. Varying one more name changes the sequence.
+    Any number of members may be added. Varying another name changes the sequence.
 
     Args:
-        replicates: R, the number of independently scrambled sequences, which take turns member by member; 1 by default.
+        replicates: Number R of independently scrambled sequences, which are used in turn, member by member; 1 by
+            default.
     """
 
     kind: ClassVar[str] = "halton"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The unit cube of an ensemble: which names vary, with how many columns each."""
+"""The unit cube of an ensemble: the varied names with their numbers of columns."""
 
 from __future__ import annotations
 

@@ -33,24 +33,26 @@ BINARY = (b"\x93NUMPY", b"PK\x03\x04", b"\x1f\x8b")
 class Table(Sampling):
     """Values of every member: from a CSV file whose first line names the columns, or from arrays by name.
 
-    Names of `vary` that the table does not contain are drawn at random. The number of members is that of the lines; fewer
-    members are the first lines. Lines may be added.
+    Names of `vary` that the table does not contain are drawn at random. By default, the number of members is the number
+    of lines; with fewer members, the first lines are used. Lines may be added.
 
     Args:
-        file: Path of the file. Its columns are numbers of the scene or entries of them, "vehicle.mass", "start.position[2]"
-            (quote a name that contains a comma), separated by commas, semicolons or tabs. Empty lines and lines that begin
-            with # are skipped.
-        values: Arrays (n,) or (n, *shape) by name, instead of a file; also a data frame, a structured array or an xarray
-            Dataset with such names, of a posterior by chain and draw too (ArviZ: idata.posterior), whose draws are members.
-        sha256: Checksum that the file must have, written by `to_dict`; any by default.
-        columns: Names of the columns to take; all by default.
+        file: Path of the file. Its columns are numbers of the scene or their entries, such as "vehicle.mass" or
+            "start.position[2]" (quote a name that contains a comma), separated by commas, semicolons or tabs. Empty
+            lines and lines that begin with # are skipped.
+        values: Arrays (n,) or (n, *shape) by name, instead of a file; or a data frame, a structured array or an xarray
+            Dataset with such names. It may be a posterior by chain and draw (ArviZ: idata.posterior); its draws are the
+            members.
+        sha256: Checksum that the file must have, as written by `to_dict`; by default it is not checked.
+        columns: Names of the columns to use; all by default.
         ignore: Names of the columns to leave out, such as an id; none by default.
-        weights: Statistical weights of the members: the name of a column, or numbers (n,), at least 0, in any unit. The
-            members then represent another distribution than the one that they were drawn from: the weight of a member is
-            the ratio of the two densities (importance sampling), or that of a draw of a posterior. By default equal.
+        weights: Statistical weights of the members: the name of a column, or numbers (n,), at least 0, in any scale.
+            The members then represent a different distribution from the one that they were drawn from. The weight of a
+            member is the ratio of the two densities (importance sampling), or the weight of a posterior draw. By
+            default equal.
 
     Raises:
-        SceneError: If the file cannot be read, or a cell is no number. The message lists every fault.
+        SceneError: If the file cannot be read, or a cell has no number. The message lists every fault.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -91,17 +93,17 @@ class Table(Sampling):
 
     @classmethod
     def kept(cls, settings: Mapping[str, Any], values: Mapping[str, np.ndarray]) -> Table:
-        """A table whose file was read when a store was made of it: the store has its numbers.
+        """Build a table from a store, which holds the numbers that were read from the file.
 
         Args:
-            settings: What `to_dict` says of the file, by key.
+            settings: Settings of the file as returned by `to_dict`, by key.
             values: Columns by name, (n,) or (n, *shape).
 
         Returns:
-            The table, whether or not the file still exists.
+            The table, even if the file no longer exists.
 
         Raises:
-            SceneError: If the values are no columns of one length.
+            SceneError: If the values are not columns of one length.
         """
         table = cls(values=values, weights=settings.get("weights"))
         for item in fields(cls):
@@ -122,7 +124,7 @@ class Table(Sampling):
             faults.add("ignore", self.ignore, "is given beside columns", "keep one of them")
 
     def _take_weights(self, faults: Faults) -> None:
-        """Make a column of weights that are given as numbers, which a store and a scene file can hold."""
+        """Turn weights given as numbers into a column, which a store and a scene file can hold."""
         if self.weights is None or isinstance(self.weights, str):
             return
         if self.file is not None:
@@ -137,7 +139,7 @@ class Table(Sampling):
             object.__setattr__(self, "weights", WEIGHTS)
 
     def _chosen(self, faults: Faults, names: Sequence[str]) -> list[str]:
-        """The names of the columns to take."""
+        """The names of the columns to use."""
         known = set(names)
         for option in ("columns", "ignore"):
             for name in getattr(self, option) or ():
@@ -223,7 +225,7 @@ class Table(Sampling):
 
 
 def moved(file: str, sha256: str | None, beside: Path) -> str:
-    """Present place of a table that moved with a store: the file with its checksum, by the last parts of its path."""
+    """Current path of a table that moved with a store: the file with its checksum, found by the last parts of its path."""
     parts = Path(file).parts[1:]
     if sha256 is None or Path(file).exists():
         return file
@@ -237,7 +239,7 @@ def moved(file: str, sha256: str | None, beside: Path) -> str:
 
 
 def check_weights(faults: Faults, key: str, weights: np.ndarray) -> None:
-    """Add a fault where numbers are no weights of members: (n,), none below 0, some above."""
+    """Add a fault unless numbers are weights of members: (n,), none negative, and some positive."""
     if weights.ndim != 1:
         faults.add(key, weights, f"has shape {weights.shape}", "give one number for each member")
     elif (weights < 0.0).any():

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Probability distributions of what varies: of single numbers, of whole quantities, and by their names in a scene file."""
+"""Probability distributions of single numbers and of whole quantities, and their names in scene files."""

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Distributions of single numbers, as quantile functions.
 
-Every distribution maps uniform numbers in (0, 1) to values, so that any sampling of the unit cube can feed it.
+Every distribution maps uniform numbers in (0, 1) to values, so it works with any sampling of the unit cube.
 """
 
 from __future__ import annotations
@@ -25,11 +25,12 @@ Spread = float | tuple[float, ...] | list[float] | np.ndarray
 @explained
 @dataclass(frozen=True)
 class Distribution(Documented):
-    """The distribution of a quantity, around the scene's value of it unless the distribution says otherwise.
+    """Base class: the distribution of a quantity, by default about the scene's value.
 
-    Numbers may be one for all components, or one per component, in the unit of the quantity.
+    Each setting is one number for all components, or one number per component, in the unit of the quantity.
 
-    Class attributes: `kind` is the name in a scene file; `widths` names the arguments of which exactly one sets the width.
+    Class attributes: `kind` is the name in a scene file; `widths` names arguments of which exactly one must set the
+    width.
 
     Raises:
         SceneError: If a number is wrong. The message lists every fault.
@@ -84,24 +85,24 @@ class Distribution(Documented):
         faults.raise_if_any()
 
     def numbers_by_name(self) -> dict[str, Any]:
-        """The numbers that were given, by the names of their fields."""
+        """The given numbers, by the names of their fields."""
         return {item.name: getattr(self, item.name) for item in fields(self) if getattr(self, item.name) is not None}
 
     def _check_more(self, faults: Faults) -> None:
-        """Add a fault for what else is wrong with this kind of distribution."""
+        """Add faults that are specific to this kind of distribution."""
 
     @property
     def joint(self) -> bool:
-        """Whether it draws whole quantities (as a `JointLaw`), and not each entry by itself."""
+        """True if it draws whole quantities (as a `JointLaw`), and not each entry independently."""
         return False
 
     @property
     def own(self) -> Any:
-        """The user's object that its numbers are of, where `to_dict` does not say all of it; None where it does."""
+        """The user's object that defines the distribution, if `to_dict` does not contain all of it; else None."""
         return None
 
     def fault(self, shapes: Sequence[tuple[int, ...]]) -> tuple[str, str] | None:
-        """Problem with drawing quantities of these shapes, and the remedy; None where it fits."""
+        """Problem with drawing quantities of these shapes, and its remedy; None if there is no problem."""
         if len(shapes) != 1:
             return f"is of one quantity, and there are {len(shapes)}", "give each a distribution"
         (shape,) = shapes
@@ -116,24 +117,24 @@ class Distribution(Documented):
         return f"does not fit a quantity of shape {shape}", f"give {wanted}"
 
     def ordered_as(self, labels: Sequence[str]) -> Distribution:
-        """The distribution with its numbers in the order of the labels of what varies, where it names them itself."""
+        """The distribution with its numbers in the order of the quantities' labels, if it names these itself."""
         return self
 
     def nothing_of(self, bases: Sequence[np.ndarray]) -> str | None:
-        """The width, relative to a scene's value of 0, by which it varies nothing; None where it does vary it."""
+        """Name of a width relative to a scene's value of 0, so that nothing varies; else None."""
         return varies_nothing(self, bases)
 
     def quantile(self, u: np.ndarray, base: np.ndarray) -> np.ndarray:
-        """Values (n, *shape) at levels u in (0, 1), (n, *shape). Every distribution of single numbers must define this."""
+        """Values (n, *shape) at levels u in (0, 1), (n, *shape). All distributions of single numbers must define this."""
         raise TypeError(f"{type(self).__name__} is abstract")
 
     def to_dict(self) -> dict[str, Any]:
-        """The distribution as a scene file has it, { normal = { std = ... } }, with the numbers that were given."""
+        """Convert to the form of a scene file, { normal = { std = ... } }, with the given numbers."""
         return {self.kind: {key: np.asarray(value).tolist() for key, value in self.numbers_by_name().items()}}
 
 
 def ordered(low: np.ndarray, high: np.ndarray) -> bool:
-    """Whether low < high in every component; False also where the shapes do not fit each other."""
+    """True if low < high in every component; False if the shapes do not fit each other."""
     try:
         return bool(np.all(low < high))
     except ValueError:
@@ -141,7 +142,7 @@ def ordered(low: np.ndarray, high: np.ndarray) -> bool:
 
 
 def varies_nothing(distribution: Distribution, bases: Sequence[np.ndarray]) -> str | None:
-    """The width, relative to a scene's value of 0, by which a distribution varies nothing; None where it does vary it."""
+    """Name of a width relative to a scene's value of 0, so that nothing varies; None if the distribution does vary it."""
     if any(np.any(base) for base in bases):
         return None
     relative = getattr(distribution, "relative", None)
@@ -152,12 +153,12 @@ def varies_nothing(distribution: Distribution, bases: Sequence[np.ndarray]) -> s
 
 
 def floats(values: Any) -> np.ndarray:
-    """Read numbers that were checked as float64: whole ones of any size among them."""
+    """Convert checked numbers to float64, including integers of any size."""
     return np.asarray(values, dtype=np.float64)
 
 
 def _width(std: Spread | None, relative: Spread | None, base: np.ndarray) -> np.ndarray:
-    """The absolute spread: as given, or as a fraction of the scene's value."""
+    """The absolute spread, given directly or as a fraction of the scene's value."""
     return floats(std) if std is not None else np.abs(base) * floats(relative)
 
 
@@ -197,10 +198,10 @@ class Uniform(Distribution):
     """Uniform distribution: from low to high, or about the scene's value.
 
     Args:
-        low: Lower end, with `high`.
-        high: Upper end, with `low`.
+        low: Lower end; requires `high`.
+        high: Upper end; requires `low`.
         half_width: Largest distance from the scene's value; instead of `low` and `high`.
-        relative: That distance as a fraction of the scene's value; instead of `half_width`.
+        relative: Largest distance as a fraction of the scene's value; instead of `half_width`.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -232,7 +233,7 @@ class Uniform(Distribution):
 
 @dataclass(frozen=True)
 class LogNormal(Distribution):
-    """Log-normal distribution: median * exp(sigma Z), Z standard normal. Values have the sign of the median.
+    """Log-normal distribution: median * exp(sigma Z) with a standard normal Z. Values have the sign of the median.
 
     Args:
         sigma: Standard deviation of the logarithm.
@@ -258,12 +259,12 @@ class TruncatedNormal(Distribution):
     """Normal distribution restricted to an interval.
 
     Args:
-        std: Standard deviation of the normal, in the unit of the quantity.
+        std: Standard deviation of the normal distribution before truncation, in the unit of the quantity.
         relative: Standard deviation as a fraction of the scene's value; instead of `std`.
-        mean: Mean of the normal; by default the scene's value.
-        low: Lower bound; without it that side is open.
-        high: Upper bound; without it that side is open.
-        width: Bounds as a multiple of the standard deviation from the mean; 3 by default where no bound is given.
+        mean: Mean of the normal distribution before truncation; by default the scene's value.
+        low: Lower bound; by default none.
+        high: Upper bound; by default none.
+        width: Distance of both bounds from the mean, in standard deviations; 3 by default if no bound is given.
     """
 
     std: Spread | None = None
@@ -301,7 +302,7 @@ class TruncatedNormal(Distribution):
             faults.add("width", self.width, "is given with low or high", "keep either width or the bounds")
 
     def _bounds(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """low, high and width, infinite where not given; width is 3 if none is given."""
+        """Bounds low, high and width; infinite if not given, but width is 3 if none is given."""
         width = 3.0 if self.width is None and self.low is None and self.high is None else self.width
         open_ended = ((self.low, -np.inf), (self.high, np.inf), (width, np.inf))
         low, high, width = (floats(default if value is None else value) for value, default in open_ended)
@@ -310,12 +311,12 @@ class TruncatedNormal(Distribution):
 
 @dataclass(frozen=True)
 class Choice(Distribution):
-    """One of several values, with probabilities in proportion to weights.
+    """One of several values, with probabilities proportional to weights.
 
     Args:
-        values: (k,): every entry of the quantity gets one of these numbers, each entry by itself; (k, *shape): the quantity
-            gets one of these as a whole.
-        weights: Weights (k,), from 0; equal by default.
+        values: (k,): every entry of the quantity independently gets one of these numbers; (k, *shape): the whole
+            quantity gets one of these values.
+        weights: Weights (k,), at least 0; equal by default.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -356,7 +357,7 @@ class Choice(Distribution):
         return f"has values of shape {shape}", f"give values of shape {shapes[0]}"
 
     def size(self, bases: Sequence[np.ndarray]) -> int:
-        """Always 1: one uniform number chooses a whole value.
+        """Number of uniform numbers, always 1: a single number chooses a whole value.
 
         Args:
             bases: The scene's value of the quantity.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Gaussian copulas: several numbers with distributions of their own, that vary together."""
+"""Gaussian copulas: several correlated numbers, each with its own distribution."""
 
 from __future__ import annotations
 
@@ -19,18 +19,20 @@ from lgvi_warp.sampling.distributions.named import as_distribution
 
 @dataclass(frozen=True, eq=False)
 class Copula(JointLaw):
-    """Several numbers that vary together by a Gaussian copula, each with a distribution of its own.
+    """Several numbers that are correlated by a Gaussian copula, each with its own distribution.
 
     The numbers are the entries of a vector, or of several quantities, named "a, b" in `vary`.
 
     Args:
-        correlation: Correlation (d, d) of the normal scores; that of the numbers is somewhat nearer to 0 where their
-            distributions are not normal. From ranks: 2 sin(pi s / 6) of Spearman's s, sin(pi t / 2) of Kendall's t.
-        marginals: Distribution of each number: a list in the order of the names, or a mapping of names to distributions.
-            Any of lgvi_warp, a frozen one of scipy.stats, or an object with quantiles.
+        correlation: Correlation (d, d) of the normal scores; the correlation of the numbers is slightly closer to 0 if
+            their distributions are not normal. From rank correlations: 2 sin(pi s / 6) for Spearman's s, sin(pi t / 2)
+            for Kendall's t.
+        marginals: Distribution of each number: a list in the order of the names, or a mapping of names to
+            distributions. A distribution may be any of lgvi_warp, a frozen one of scipy.stats, or an object with
+            quantiles.
 
     Raises:
-        SceneError: If the matrix is no correlation matrix, or a marginal is not a distribution of a single number.
+        SceneError: If the matrix is not a correlation matrix, or a marginal is not a distribution of a single number.
 
     Examples:
         >>> import lgvi_warp as lw

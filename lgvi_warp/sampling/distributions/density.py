@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Kernel densities: a smooth distribution from draws, of one number or of several together."""
+"""Kernel densities: smooth distributions of one number, or jointly of several, from draws."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ AT_ONCE = 4_000_000
 
 @dataclass(frozen=True, eq=False)
 class KernelDensity(JointLaw):
-    """Gaussian kernel density of draws, such as those of a posterior: of one number, or of several together.
+    """Gaussian kernel density of draws, such as posterior draws: of one number, or jointly of several.
 
-    Its values are absolute: the scene's own value is not used. The density is the mean of normal distributions about the
-    draws. For one number, values rise with the level, so that Sobol points and other designs stay evenly spread. For
-    several, one level selects a draw, and the others the displacement from it.
+    Its values are absolute: the scene's own value is not used. The density is the mean of normal distributions about
+    the draws. For one number, values rise with the level, so that Sobol points and other designs remain evenly spread.
+    For several numbers, one level selects a draw, and the other levels select the displacement from it.
 
     Args:
-        draws: Draws (n,) of one number, or (n, d) of d numbers together: the entries of a vector, or of several quantities,
-            named "a, b" in `vary`.
+        draws: Draws (n,) of one number, or (n, d) jointly of d numbers: the entries of a vector, or of several
+            quantities, named "a, b" in `vary`.
         bandwidth: Standard deviation of the kernels, in the unit of the quantity: one number, or (d,). By default Scott's
-            rule: the draws' own covariance, times n^(-2 / (d + 4)).
+            rule: the covariance of the kernels is the covariance of the draws times n^(-2 / (d + 4)).
 
     Raises:
         SceneError: If the draws do not vary or are fewer than 2, or a bandwidth is not above 0.
@@ -116,7 +116,7 @@ class KernelDensity(JointLaw):
 
     @functools.cached_property
     def _inverse(self) -> Callable[[np.ndarray], np.ndarray]:
-        """Values by the normal score of their level, between the points of a table monotone cubic."""
+        """Function from the normal score of a level to the value, by monotone cubic interpolation of a table."""
         from scipy.interpolate import PchipInterpolator
 
         draws, h = np.sort(self._columns[:, 0]), float(self._root[0, 0])  # type: ignore[attr-defined]
@@ -136,7 +136,7 @@ class KernelDensity(JointLaw):
 
 
 def _points(draws: np.ndarray, h: float) -> np.ndarray:
-    """Rising points that lie densely wherever a kernel of the sorted draws reaches."""
+    """Rising points, dense wherever a kernel of the sorted draws reaches."""
     near = REACH * h
     ends = np.flatnonzero(np.diff(draws) > 2.0 * near)
     first, last = draws[np.append(0, ends + 1)] - near, draws[np.append(ends, len(draws) - 1)] + near

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Numbers that follow from a few factors by functions of the user's."""
+"""Numbers that custom functions compute from a few random factors."""
 
 from __future__ import annotations
 
@@ -19,17 +19,18 @@ from lgvi_warp.sampling.distributions.named import as_distribution
 class Derived(JointLaw):
     """Numbers computed from one random factor, or a few: vary = {"drag.quadratic": Derived({...}, k=...)}.
 
-    The key in `vary` names the same numbers as the mapping: "drag.linear, drag.quadratic" for two. A file holds no functions:
-    a run that is read from a file needs the ensemble again.
+    The key in `vary` names the same numbers as the mapping, such as "drag.linear, drag.quadratic". A file cannot store
+    functions, so a run that is read from a file needs the ensemble again.
 
     Args:
-        functions: Function of each number, by its name. Its arguments are named like the factors, each an array that
-            multiplies with the scene's value of the number. It returns the number of each member.
-        factors: Distribution of each factor, of a single number; a distribution that is about the scene's value by default
-            is about 1 here.
+        functions: Name of a number -> function that returns the number of each member. The function's arguments have
+            the names of the factors; each is an array that can be multiplied by the scene's value of the number.
+        factors: Distribution of each factor, for a single number. A distribution that is otherwise about the scene's
+            value is about 1 here.
 
     Raises:
-        SceneError: If something is no function or no distribution, or a function takes what is no factor.
+        SceneError: If an entry is not a function or not a distribution, or if an argument of a function is not a
+            factor.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -134,7 +135,7 @@ class Derived(JointLaw):
 
 
 def _arguments(faults: Faults, name: str, function: Any, factors: Mapping[str, Any]) -> list[str]:
-    """The factors that a function takes, by the names of its arguments."""
+    """The factors that are arguments of a function, by name."""
     try:
         parameters = inspect.signature(function).parameters.values()
     except (TypeError, ValueError):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One factor for all entries of a number, or of several."""
+"""One random factor for all entries of a number, or of several numbers."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from lgvi_warp.sampling.distributions.named import as_distribution
 
 @dataclass(frozen=True, eq=False)
 class Factor(JointLaw):
-    """One factor of a member for all entries of the scene's value of a number, or of several, named "a, b" in `vary`.
+    """One random factor per member for all entries of a scene's number, or of several numbers, named "a, b" in `vary`.
 
     In a scene file: "drag_matrix.quadratic" = { factor = { uniform = { low = 0.8, high = 1.2 } } }.
 
     Args:
-        law: Distribution of the factor; a distribution that is about the scene's value by default is about 1 here.
+        law: Distribution of the factor. A distribution that is otherwise about the scene's value is about 1 here.
 
     Raises:
-        SceneError: If `law` is no distribution of a single number.
+        SceneError: If `law` is not a distribution of a single number.
 
     Examples:
         >>> import lgvi_warp as lw

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Joint distributions, of whole quantities or of several: correlated normals, rotations, matrices that stay physical."""
+"""Joint distributions of one or several whole quantities: correlated normals, rotations, physical matrices."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def normals(u: np.ndarray) -> np.ndarray:
 def combined(matrix: np.ndarray, z: np.ndarray) -> np.ndarray:
     """A matrix (d, d) times each row of numbers (n, d).
 
-    The sum is written out: its order, and so its bits, must not depend on the number of rows.
+    The sum is written out, since its order, and so its bits, must not depend on the number of rows.
     """
     total = z[:, :1] * matrix[:, 0]
     for k in range(1, z.shape[1]):
@@ -38,9 +38,9 @@ def combined(matrix: np.ndarray, z: np.ndarray) -> np.ndarray:
 
 
 def correlation(covariance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Standard deviations (d,) and correlation (d, d) of a covariance, with 1 on the diagonal where the variance is 0.
+    """Standard deviations (d,) and correlation (d, d) of a covariance, with 1 on the diagonal even if a variance is 0.
 
-    Units and sizes of the entries play no part in the correlation: metres beside newtons are judged alike.
+    The correlation does not depend on units and sizes of the entries, such as metres next to newtons.
     """
     std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     scale = np.where(std > 0.0, std, 1.0)
@@ -48,13 +48,13 @@ def correlation(covariance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def root_of_covariance(covariance: np.ndarray) -> np.ndarray:
-    """L with L L^T = covariance (d, d), positive semidefinite, found from the correlation."""
+    """Root L with L L^T = covariance (d, d), positive semidefinite, computed from the correlation."""
     std, C = correlation(covariance)
     return np.asarray(std[:, None] * root(C))
 
 
 def root(matrix: np.ndarray) -> np.ndarray:
-    """L with L L^T = matrix (d, d): Cholesky's factor, or the symmetric root where the matrix is singular."""
+    """Root L with L L^T = matrix (d, d): the Cholesky factor, or the symmetric root if the matrix is singular."""
     try:
         return np.linalg.cholesky(matrix)
     except np.linalg.LinAlgError:
@@ -63,7 +63,7 @@ def root(matrix: np.ndarray) -> np.ndarray:
 
 
 def covariance_of(faults: Faults, distribution: Any, size: int | None) -> np.ndarray | None:
-    """The covariance that was given, or that follows from std and correlation; None after adding a fault."""
+    """The given covariance, or the one from std and correlation; None after adding a fault."""
     arguments = {name for name in ("covariance", "std", "correlation") if getattr(distribution, name, None) is not None}
     if ("covariance" in arguments) == ("std" in arguments) or arguments == {"covariance", "correlation"}:
         fault = f"{' and '.join(sorted(arguments)) or 'nothing'} given"
@@ -114,31 +114,31 @@ def components(shapes: Sequence[tuple[int, ...]]) -> int:
 
 
 def split(drawn: np.ndarray, bases: Sequence[np.ndarray]) -> list[np.ndarray]:
-    """Entries (n, d) as the quantities that they are of, (n, *shape) each."""
+    """Split entries (n, d) into their quantities, (n, *shape) each."""
     parts = np.split(drawn, np.cumsum([base.size for base in bases])[:-1], axis=1)
     return [entries.reshape(len(drawn), *base.shape) for entries, base in zip(parts, bases, strict=True)]
 
 
 @dataclass(frozen=True)
 class JointLaw(Distribution):
-    """A distribution of whole quantities: `size` uniform numbers give all of their entries."""
+    """A distribution of whole quantities: `size` uniform numbers determine all of their entries."""
 
     @property
     def joint(self) -> bool:
         return True
 
     def size(self, bases: Sequence[np.ndarray]) -> int:
-        """The number of uniform numbers for one draw. Every joint distribution must define this."""
+        """The number of uniform numbers for one draw. All joint distributions must define this."""
         raise TypeError(f"{type(self).__name__} is abstract")
 
     def draw(self, u: np.ndarray, bases: Sequence[np.ndarray]) -> list[np.ndarray]:
-        """Draw values (n, *shape) of each quantity from levels (n, size). Every joint distribution must define this."""
+        """Draw values (n, *shape) of each quantity from levels (n, size). All joint distributions must define this."""
         raise TypeError(f"{type(self).__name__} is abstract")
 
 
 @dataclass(frozen=True)
 class Levels(JointLaw):
-    """Independent uniform numbers in (0, 1), all those of a number as one factor: what a term draws by itself."""
+    """Independent uniform numbers in (0, 1) for a term's own draws; all entries of a number form one factor."""
 
     kind: ClassVar[str] = "levels"
 
@@ -153,13 +153,13 @@ class Levels(JointLaw):
 class CorrelatedNormal(JointLaw):
     """Normal distribution with a covariance between the entries of one quantity, or of several, named "a, b" in `vary`.
 
-    Entries of a symmetric matrix are those on and above the diagonal; entries of a diagonal matrix, those on the diagonal.
+    The entries of a symmetric matrix are those on and above the diagonal; of a diagonal matrix, those on the diagonal.
 
     Args:
         covariance: Covariance (d, d), in the units and order of the entries; it may be singular.
-        std: Standard deviation, one or (d,); instead of `covariance`.
-        correlation: Correlation (d, d), with `std`; none by default.
-        mean: Mean, one or (d,); by default the scene's values.
+        std: Standard deviation, one number or (d,); instead of `covariance`.
+        correlation: Correlation (d, d), together with `std`; by default the entries are independent.
+        mean: Mean, one number or (d,); by default the scene's values.
 
     Raises:
         SceneError: If the matrix is not positive semidefinite or the numbers do not fit. The message lists every fault.
@@ -215,7 +215,7 @@ class CorrelatedNormal(JointLaw):
 
 @dataclass(frozen=True)
 class AttitudeDistribution(JointLaw):
-    """A distribution of attitudes; abstract. The ensemble gives it attitudes only."""
+    """A distribution of attitudes; abstract. The ensemble uses it only for attitudes."""
 
     def fault(self, shapes: Sequence[tuple[int, ...]]) -> tuple[str, str] | None:
         return None
@@ -229,11 +229,11 @@ class AttitudeDistribution(JointLaw):
 class RotationNormal(AttitudeDistribution):
     """Concentrated normal distribution of an attitude, R = R0 exp(hat(v)); for "start.attitude".
 
-    R0 is the scene's attitude, and v is normal about 0, in body axes. Barfoot & Furgale (2014), Associating uncertainty
-    with three-dimensional poses, with the perturbation on the body's side.
+    R0 is the scene's attitude, and v is normal with mean 0, in body axes. Barfoot & Furgale (2014), Associating
+    uncertainty with three-dimensional poses, with the perturbation on the body's side.
 
     Args:
-        std: Standard deviation of v about the body's axes, one or (3,) [rad].
+        std: Standard deviation of v about the body axes, one number or (3,) [rad].
         covariance: Covariance of v, (3, 3) [rad^2]; instead of `std`.
 
     Raises:
@@ -261,7 +261,7 @@ class RotationNormal(AttitudeDistribution):
 
 @dataclass(frozen=True)
 class UniformRotation(AttitudeDistribution):
-    """Uniform distribution of an attitude: Haar's measure on SO(3), whatever the scene's attitude; for "start.attitude".
+    """Uniform distribution of an attitude on SO(3) (Haar measure), for any scene attitude; for "start.attitude".
 
     Shoemake (1992), Uniform random rotations, in Graphics Gems III.
     """
@@ -278,15 +278,15 @@ class UniformRotation(AttitudeDistribution):
 
 @dataclass(frozen=True)
 class PositiveDefinite(JointLaw):
-    """Distribution of a symmetric matrix that stays positive definite: A = L T T^T L^T, L L^T the scene's matrix.
+    """Distribution of a symmetric positive definite matrix: A = L T T^T L^T, where L L^T is the scene's matrix.
 
-    T is lower triangular, with exp(sigma z / 2) on the diagonal and off_diagonal z below it, z standard normal. So the
-    logarithm of each entry of a diagonal matrix varies with standard deviation sigma, and its median is the scene's. What
-    is zero in the scene, such as an added mass that is absent, stays zero. After the log-Cholesky coordinates of Lin
+    T is lower triangular, with exp(sigma z / 2) on the diagonal and off_diagonal z below it; each z is standard normal.
+    So for a diagonal matrix, the logarithm of each entry has standard deviation sigma, and its median is the scene's
+    value. Zeros of the scene, such as an absent added mass, remain zero. It follows the log-Cholesky coordinates of Lin
     (2019), Riemannian geometry of symmetric positive definite matrices via Cholesky decomposition.
 
     Args:
-        sigma: Standard deviation of the logarithm, one or (d,).
+        sigma: Standard deviation of the logarithm, one number or (d,).
         off_diagonal: Standard deviation of the entries of T below the diagonal; 0 by default.
     """
 
@@ -309,13 +309,13 @@ class PositiveDefinite(JointLaw):
         return f"has {np.asarray(self.sigma).size} sigmas for a {d} x {d} matrix", f"give one number or {d}"
 
     def unusable(self, base: np.ndarray) -> tuple[str, str] | None:
-        """Problem with a start at the scene's matrix.
+        """Problem with the scene's matrix as the centre of the distribution.
 
         Args:
             base: The scene's matrix (d, d).
 
         Returns:
-            The fault and its remedy; None where the matrix is positive semidefinite.
+            The fault and its remedy; None if the matrix is positive semidefinite.
         """
         if np.linalg.eigvalsh(base)[0] >= -ROUND_OFF * np.abs(base).max():
             return None
@@ -347,16 +347,16 @@ class PositiveDefinite(JointLaw):
 
 @dataclass(frozen=True)
 class PhysicalInertia(PositiveDefinite):
-    """Distribution of the inertia of a rigid body that stays physical: no principal inertia above the sum of the other two.
+    """Distribution of a rigid body's physical inertia: no principal inertia exceeds the sum of the other two.
 
-    It is `PositiveDefinite` of the second moments of mass S = tr(J) / 2 - J, then J = tr(S) - S: an inertia is that of a
-    distribution of mass exactly where S is positive definite (Wensing, Kim & Slotine 2018, Linear matrix inequalities for
-    physically consistent inertial parameter identification). It serves "vehicle.inertia", whose scene value must itself
-    be that of a rigid body, and "vehicle.rigid_body_mass_matrix": there S is about the centre of gravity, which stays
-    where it is.
+    It applies `PositiveDefinite` to the second moments of mass S = tr(J) / 2 - J, and returns J = tr(S) - S. An inertia
+    belongs to a distribution of mass if and only if S is positive definite (Wensing, Kim & Slotine 2018, Linear matrix
+    inequalities for physically consistent inertial parameter identification). Use it for "vehicle.inertia", whose scene
+    value must be physical, and for "vehicle.rigid_body_mass_matrix", with S about the centre of gravity, which stays
+    fixed.
 
     Args:
-        sigma: Standard deviation of the logarithm of the principal second moments, one or (3,).
+        sigma: Standard deviation of the logarithm of the principal second moments, one number or (3,).
         off_diagonal: Standard deviation of the entries below the diagonal of the factor of S; 0 by default.
         mass_sigma: Standard deviation of the logarithm of the mass, for a 6x6 matrix; 0 by default.
 
@@ -415,7 +415,7 @@ def second_moments(J: np.ndarray) -> np.ndarray:
 
 
 def _about_center(base: np.ndarray) -> tuple[np.ndarray, float, np.ndarray]:
-    """Inertia about the centre of gravity, mass and centre of gravity of a rigid body's 3x3 or 6x6 matrix."""
+    """Inertia about the centre of gravity, mass and centre of gravity, from a rigid body's 3x3 or 6x6 matrix."""
     if len(base) == 3:
         return base, 0.0, np.zeros(3)
     mass = float(base[0, 0])
@@ -425,5 +425,5 @@ def _about_center(base: np.ndarray) -> tuple[np.ndarray, float, np.ndarray]:
 
 
 def _dimensions(values: Any) -> int:
-    """The number of dimensions of what a user gave; 2 of lists that differ in length."""
+    """The number of dimensions of a user's values; 2 for lists of different lengths."""
     return 2 if ragged(values) else np.ndim(values)

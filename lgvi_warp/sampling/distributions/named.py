@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Every distribution by its name in a scene file, and those of scipy.stats."""
+"""All distributions by their names in scene files, and distributions of scipy.stats."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ ADDRESS = re.compile(r" at 0x[0-9a-fA-F]+")
 
 @dataclass(frozen=True, eq=False)
 class ScipyDistribution(Distribution):
-    """A frozen distribution of scipy.stats, as lw.distributions.ScipyDistribution(scipy.stats.gamma(2.0, scale=3.0)).
+    """A frozen distribution of scipy.stats: lw.distributions.ScipyDistribution(scipy.stats.gamma(2.0, scale=3.0)).
 
     `vary` also accepts the scipy distribution itself. Its values are absolute: the scene's own value is not used.
 
     Args:
-        distribution: The frozen distribution; its parameters are one number or one per component.
+        distribution: The frozen distribution; each parameter is one number, or one number per component.
 
     Raises:
         SceneError: If it is not frozen, has no quantiles, or scipy refuses its numbers.
@@ -79,7 +79,7 @@ class ScipyDistribution(Distribution):
         return dict(zip(known, self.distribution.args, strict=False)) | dict(self.distribution.kwds)
 
     def _numbers(self) -> dict[str, Any]:
-        """The parameters as lists; loc = 0 for a distribution that was frozen with none, so that a file holds a number."""
+        """The parameters as lists; without any parameter loc = 0, so that a file contains a number."""
         parameters = self.numbers_by_name() or {"loc": 0.0}
         return {name: np.asarray(value).tolist() for name, value in parameters.items()}
 
@@ -100,10 +100,10 @@ class ScipyDistribution(Distribution):
 
     @classmethod
     def from_table(cls, key: str, kind: str, values: Mapping[str, Any]) -> ScipyDistribution:
-        """Build a distribution from what `to_dict` gives.
+        """Build a distribution from the dict of `to_dict`.
 
         Args:
-            key: Name of what varies, with which faults begin.
+            key: Name of the varied quantity, with which faults begin.
             kind: Name of the distribution in a scene file, or "scipy".
             values: Parameters by name; with "scipy" also the name in scipy.stats.
 
@@ -173,15 +173,15 @@ class BinnedDistribution(Distribution):
 
 @dataclass(frozen=True, eq=False)
 class UserDistribution(Distribution):
-    """A distribution given by an object of the user's with quantiles: ppf(u), or icdf(u) as scipy's new distributions have.
+    """A distribution given by a user's object with quantiles: ppf(u), or icdf(u) as in scipy's new distributions.
 
-    Its values are absolute. A file stores only its text, so that a run read from a file needs the ensemble again.
+    Its values are absolute. A file stores only its text, so a run that is read from a file needs the ensemble again.
 
     Args:
         distribution: The object.
 
     Raises:
-        SceneError: If the object gives no finite numbers at the levels 0.25 and 0.75.
+        SceneError: If the object does not give finite numbers at the levels 0.25 and 0.75.
     """
 
     distribution: Any = None
@@ -217,7 +217,7 @@ class UserDistribution(Distribution):
 
 
 def quantiles_of(distribution: Any) -> Any:
-    """The quantile function of an object, its method ppf or icdf; None where it has neither."""
+    """The quantile function of an object, its method ppf or icdf; None if it has neither."""
     function = getattr(distribution, "ppf", None) or getattr(distribution, "icdf", None)
     return function if callable(function) else None
 
@@ -230,19 +230,19 @@ OPENTURNS = ("computeQuantile", "getMarginal", "getDimension")
 
 
 def is_frozen(value: Any) -> bool:
-    """Whether an object is a frozen distribution of scipy.stats, found without importing that."""
+    """True if an object is a frozen distribution of scipy.stats; this does not import scipy."""
     return all(hasattr(value, name) for name in ("dist", "args", "kwds", "ppf"))
 
 
 def name_of_unfrozen(value: Any) -> str | None:
-    """The name of a distribution of scipy.stats that was given without numbers, such as scipy.stats.norm; else None."""
+    """Name of a distribution of scipy.stats without numbers, such as scipy.stats.norm; else None."""
     known = sys.modules.get("scipy.stats")
     name = getattr(value, "name", None)
     return name if isinstance(name, str) and known is not None and getattr(known, name, None) is value else None
 
 
 def without_numbers(value: Any) -> tuple[str, str]:
-    """The fault of a distribution of scipy.stats that was given without numbers."""
+    """The fault of a distribution of scipy.stats without numbers."""
     numbers = ", ".join(f"{name}=..." for name in _numbers_of(value))
     remedy = f"give them: scipy.stats.{value.name}({numbers})"
     return "is not a frozen distribution of scipy.stats: it has no numbers", remedy
@@ -259,7 +259,7 @@ def _numbers_of(distribution: Any) -> list[str]:
 
 
 def as_distribution(key: str, value: Any) -> Any:
-    """Turn what stands in `vary` into a distribution, where it is one."""
+    """Turn an entry of `vary` into a distribution, if it is one."""
     if isinstance(value, Distribution | type):
         return value
     if isinstance(value, Mapping):

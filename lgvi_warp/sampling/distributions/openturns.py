@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Distributions of OpenTURNS, by their methods: the library itself is not needed."""
+"""Distributions of OpenTURNS, used through their methods: the library is not imported."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ ADDRESS = re.compile(r" at 0x[0-9a-fA-F]+")
 
 @dataclass(frozen=True, eq=False)
 class OpenTURNSDistribution(JointLaw):
-    """A distribution of OpenTURNS, of one number or of several together; `vary` also accepts it without this class.
+    """A distribution of OpenTURNS, of one number or jointly of several; `vary` also accepts it without this class.
 
-    Its values are absolute. Several numbers follow from levels one after the other, each given those before (Rosenblatt). A
-    file stores only its text, so that a run read from a file needs the ensemble again.
+    Its values are absolute. Several numbers follow from levels one by one, each conditional on the numbers before
+    (Rosenblatt). A file stores only its text, so a run that is read from a file needs the ensemble again.
 
     Args:
         distribution: The distribution.
 
     Raises:
-        SceneError: If it gives no finite numbers in its middle.
+        SceneError: If it does not give finite numbers in its middle.
     """
 
     distribution: Any = None
@@ -76,7 +76,7 @@ class OpenTURNSDistribution(JointLaw):
 
     @staticmethod
     def _one_number(distribution: Any, levels: np.ndarray) -> np.ndarray:
-        """Quantiles (n,) at levels (n,): a list of levels gives a sample, a point for each."""
+        """Quantiles (n,) at levels (n,); OpenTURNS returns a sample with a point for each level."""
         return np.asarray(distribution.computeQuantile(levels.tolist()), dtype=np.float64).reshape(len(levels))
 
     def _together(self, u: np.ndarray) -> np.ndarray:

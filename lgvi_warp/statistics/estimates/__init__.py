@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Results of statistics: estimates with intervals, tables of them, sketches, and comparisons."""
+"""Results of statistics: estimates with intervals, tables, quantile sketches, and comparisons."""

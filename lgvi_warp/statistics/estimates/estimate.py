@@ -45,16 +45,16 @@ def along(names: Iterable[str], *dims: str) -> Dims:
 class Estimate(Summarized):
     """The values of one statistic with their intervals, as named arrays: estimate["count"].
 
-    Arrays that all estimates have are attributes too: value, lower, upper, count.
+    Arrays that all estimates have are also attributes: value, lower, upper, count.
 
     Args:
-        name: name of the statistic, as in "mean position".
+        name: name of the statistic, such as "mean position".
         settings: the statistic's table, as in a scene file.
         unit: unit of the value.
         confidence: confidence level of the intervals.
-        interval: how the interval was formed.
-        dims: names of each array's dimensions. The first is "time" (of length 1 for a statistic of paths), then
-            component, level or bin.
+        interval: text on the kind of the interval.
+        dims: names of each array's dimensions: "time" (of length 1 for a statistic of paths), then component, level or
+            bin.
         arrays: the arrays by name.
         coordinates: coordinates of the dimensions: "time" (k,) [s], "component" and so on.
     """
@@ -95,13 +95,13 @@ class Estimate(Summarized):
 
     @property
     def half_width(self) -> np.ndarray:
-        """The larger distance from the value to an end of its interval; infinite where the interval is unbounded."""
+        """Distance from the value to the farther end of its interval; infinite if the interval is unbounded."""
         with np.errstate(invalid="ignore"):
             return np.fmax(self.upper - self.value, self.value - self.lower)
 
     @property
     def count(self) -> np.ndarray:
-        """Number of members behind the value at each time, (k,)."""
+        """Number of members that contribute to the value at each time, (k,)."""
         return self._array("count")
 
     @property
@@ -116,13 +116,13 @@ class Estimate(Summarized):
         ]
 
     def with_interval(self, interval: str, arrays: Mapping[str, np.ndarray]) -> Estimate:
-        """Return the same estimate with another interval: how it was formed, and its arrays, each as the value if new."""
+        """Return the estimate with another interval: its kind and its arrays; new arrays are shaped like the value."""
         dims = {name: self.dims["value"] for name in arrays} | dict(self.dims)
         return replace(self, interval=interval, dims=dims, arrays=self.arrays | dict(arrays))
 
     @functools.cached_property
     def dataset(self) -> xarray.Dataset:
-        """The arrays as an xarray Dataset; ImportError where xarray is not installed (extra: store)."""
+        """The arrays as an xarray Dataset; ImportError if xarray is not installed (extra: store)."""
         try:
             import xarray as xr
         except ImportError as error:
@@ -138,10 +138,10 @@ class Estimate(Summarized):
 
 
 class Estimates(Summarized, Mapping[str, Estimate]):
-    """The estimates of a run by name, in the order of the statistics; "above 10.0" in a name is found as "above 10".
+    """The estimates of a run by name, in the order of the statistics; a name with "above 10.0" also finds "above 10".
 
     Attributes:
-        messages: what the user should know of them; of the statistics of a run its result has that.
+        messages: notes for the user; for the statistics of a run, the notes are in its result.
     """
 
     def __init__(self, estimates: Sequence[Estimate] = (), messages: tuple[str, ...] = ()):
@@ -172,8 +172,8 @@ class Estimates(Summarized, Mapping[str, Estimate]):
     def dataset(self) -> xarray.Dataset:
         """All estimates as one xarray Dataset.
 
-        "mean position" becomes the variable mean_position, the lower end of its interval mean_position_lower. In names
-        of variables -0.5 becomes minus_0_5; of names that would be equal the later ones end in _2, _3.
+        "mean position" becomes the variable mean_position, and the lower end of its interval mean_position_lower. In
+        names of variables -0.5 becomes minus_0_5. If names would be equal, the later ones end in _2, _3.
         """
         import xarray as xr
 
@@ -211,7 +211,7 @@ class Estimates(Summarized, Mapping[str, Estimate]):
 
 
 def _shown(estimate: Estimate) -> summaries.Rows:
-    """Label, value and interval of each of an estimate's numbers at the last sample time."""
+    """Label, value and interval of each number of an estimate at the last sample time."""
     lines = [(label, f"{value}, {ends}, {members}") for label, value, ends, members in texts_of(estimate)]
     return lines or [
         (estimate.name, f"{' x '.join(map(str, estimate.value.shape))} values ({', '.join(estimate.dims['value'])})")
@@ -219,6 +219,6 @@ def _shown(estimate: Estimate) -> summaries.Rows:
 
 
 def _renamed(single: xarray.Dataset, word: str) -> dict[Hashable, str]:
-    """New names of the variables and dimensions of one estimate's dataset, which keep it apart from the others."""
+    """Names of variables and dimensions of an estimate's dataset that distinguish it from the others."""
     names = {name: word if name == "value" else f"{word}_{name}" for name in single.data_vars}
     return names | {d: f"{d}_of_{word}" for d, n in single.sizes.items() if d != "time" or n == 1}

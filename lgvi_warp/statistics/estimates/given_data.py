@@ -19,7 +19,7 @@ NOTHING = 1e-20
 
 
 class Explained(NamedTuple):
-    """Share of an output's variance that one input explains (first-order index); it may come out just below 0."""
+    """Share of an output's variance that one input explains (first-order index); the estimate may be slightly below 0."""
 
     share: float
     lower: float
@@ -29,12 +29,13 @@ class Explained(NamedTuple):
 
 
 def explained(inputs: Mapping[str, np.ndarray], y: np.ndarray, confidence: float) -> dict[str, Explained]:
-    """Return what each input (n,) explains of an output (n,); members with a number that is not finite are left out.
+    """Return the share of an output (n,) that each input (n,) explains; members with infinite numbers or NaN are left out.
 
-    The members are divided into bins of each input, of about as many members, with a line in each where members are many.
-    The share is the variance that bins and lines explain over that of all, less what chance alone puts there (Kelley's
-    epsilon squared, 1935). Its interval is of the noncentral F distribution, widened as the delta method says for numbers
-    that are drawn, and upwards by what twice as wide bins explain less. Inputs are meant to be independent of one another.
+    The members are divided into bins of each input with about equal numbers of members; with many members, each bin
+    also fits a line. The share is the explained variance divided by the total, minus the share expected by chance
+    (Kelley's epsilon squared, 1935). Its interval follows from the noncentral F distribution. The delta method widens
+    it, since inputs are random; its upper end also grows by the loss from bins of twice the width. Inputs should be
+    independent of each other.
     """
     names, y = list(inputs), np.asarray(y, np.float64)
     X = np.stack([np.asarray(inputs[name], np.float64) for name in names]) if names else np.zeros((0, len(y)))
@@ -45,7 +46,7 @@ def explained(inputs: Mapping[str, np.ndarray], y: np.ndarray, confidence: float
 
 
 def _slopes(X: np.ndarray, y: np.ndarray) -> list[float]:
-    """Coefficients of the linear regression of standardised numbers; NaN for what does not vary."""
+    """Coefficients of the linear regression of standardised numbers; NaN for an input that does not vary."""
     slopes = np.full(len(X), np.nan)
     if len(y) > 2 and np.ptp(y) > 0.0:
         moves = np.ptp(X, axis=1) > 0.0
@@ -92,7 +93,7 @@ def _index(x: np.ndarray, y: np.ndarray, confidence: float) -> tuple[float, floa
 def _left(x: np.ndarray, y: np.ndarray, bins: np.ndarray, with_lines: bool) -> tuple[np.ndarray, int]:
     """Residual of each number (n,) after the bins, and the number of fitted parameters.
 
-    A bin fits the mean of its members, or a line, so that little of a steep dependence is left.
+    A bin fits the mean of its members, or a line, which leaves little of a steep dependence.
     """
     sizes = np.bincount(bins)
     count = len(sizes)
@@ -111,14 +112,14 @@ def _left(x: np.ndarray, y: np.ndarray, bins: np.ndarray, with_lines: bool) -> t
 
 
 def _bins(x: np.ndarray) -> np.ndarray:
-    """The bin (n,) of each number, by its rank; equal numbers are in one bin, and no bin is empty."""
+    """The bin (n,) of each number, by its rank; equal numbers share a bin, and no bin is empty."""
     count = int(np.clip(2.0 * len(x) ** (1.0 / 3.0), FEWEST_BINS, MOST_BINS))
     edges = np.unique(np.quantile(x, np.arange(1, count) / count)) if len(x) else x
     return np.unique(np.searchsorted(edges, x, side="right"), return_inverse=True)[1]
 
 
 def _shift(level: float, ratio: float, free: tuple[int, int]) -> float:
-    """The noncentrality for which an F ratio is at this level of its distribution; 0 where there is none."""
+    """The noncentrality for which an F ratio is at this level of its distribution; 0 if there is none."""
     from scipy.optimize import brentq
     from scipy.special import chdtri
     from scipy.stats import ncf

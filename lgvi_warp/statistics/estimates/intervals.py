@@ -9,14 +9,14 @@ import numpy as np
 
 
 def normal(confidence: float) -> float:
-    """Return half the width of a normal variable's central interval, in standard deviations."""
+    """Return the half width of a normal variable's central interval, in standard deviations."""
     from scipy.special import ndtri
 
     return float(ndtri(0.5 + 0.5 * confidence))
 
 
 def student(count: np.ndarray, confidence: float) -> np.ndarray:
-    """Return half the width of a mean's interval in standard errors: Student's t of count - 1 degrees of freedom.
+    """Return the half width of a mean's interval in standard errors: Student's t with count - 1 degrees of freedom.
 
     docs/theory/estimators.md, (E1).
     """
@@ -33,7 +33,7 @@ def about(value: np.ndarray, standard_error: np.ndarray, factor: np.ndarray) -> 
 
 
 def of_logarithm(value: np.ndarray, standard_error: np.ndarray, factor: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the interval of a positive number from that of its logarithm: value exp(-+ factor standard_error / value).
+    """Return the interval of a positive number from its logarithm's interval: value exp(-+ factor standard_error / value).
 
     docs/theory/estimators.md, (E4).
     """
@@ -47,7 +47,7 @@ def of_logarithm(value: np.ndarray, standard_error: np.ndarray, factor: np.ndarr
 def wilson(
     probability: np.ndarray, count: np.ndarray, confidence: float, factor: float | np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return where |p - p0| <= z sqrt(p0 (1 - p0) / n), the interval of p0 that n trials estimated as p (Wilson 1927).
+    """Return Wilson's interval (1927) of a probability p0 that n trials estimate as p: |p - p0| <= z sqrt(p0 (1 - p0) / n).
 
     docs/theory/estimators.md, (E5).
     """
@@ -64,7 +64,7 @@ def wilson(
 
 
 def clopper_pearson(hits: np.ndarray, count: np.ndarray, confidence: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return a probability's interval with tails below half of 1 - confidence (Clopper & Pearson 1934): never too narrow.
+    """Return Clopper & Pearson's interval (1934), with tails below (1 - confidence) / 2: it is never too narrow.
 
     docs/theory/estimators.md, (E6).
     """
@@ -78,7 +78,7 @@ def clopper_pearson(hits: np.ndarray, count: np.ndarray, confidence: float) -> t
 
 
 def none_of(count: int, confidence: float) -> float:
-    """Return the one-sided upper limit of a probability of which no hit was seen: 1 - (1 - confidence)^(1 / n).
+    """Return the one-sided upper limit of a probability without any hit in n trials: 1 - (1 - confidence)^(1 / n).
 
     docs/theory/estimators.md, (E7).
     """
@@ -90,8 +90,8 @@ def of_replicates(each: np.ndarray, confidence: float) -> tuple[np.ndarray, np.n
 
     docs/theory/estimators.md, (E13).
 
-    Infinite where an estimate is missing. L'Ecuyer, Nakayama, Owen & Tuffin (2023): none is more reliable among those that
-    they compare for randomized quasi-Monte Carlo.
+    Both are infinite if an estimate is missing. Among the intervals for randomized quasi-Monte Carlo that L'Ecuyer,
+    Nakayama, Owen & Tuffin (2023) compare, none is more reliable.
     """
     R = len(each)
     with np.errstate(invalid="ignore"):
@@ -103,12 +103,13 @@ def of_replicates(each: np.ndarray, confidence: float) -> tuple[np.ndarray, np.n
 def probability_of_replicates(
     probability: np.ndarray, each: np.ndarray, count: np.ndarray, confidence: float, least: float = 1.0
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return Wilson's interval with the variance of the fractions (R, ...) of R replicates, and Student's t factor.
+    """Return Wilson's interval with the variance of the R replicates' fractions (R, ...) and Student's t factor.
 
     docs/theory/estimators.md, (E14).
 
-    The standard error of `least` members among `count` is added in squares: counts are whole numbers, and replicates may
-    agree by chance. Where none or all members were counted there is no spread: it is that of `count` independent members.
+    The standard error of `least` members among `count` is added in squares, since replicates may agree by chance:
+    counts are whole numbers. If none or all members were counted, there is no spread: then the interval is that of
+    `count` independent members.
     """
     error, _ = of_replicates(each, confidence)
     error = np.hypot(error, least / np.maximum(count, 1))
@@ -120,7 +121,7 @@ def probability_of_replicates(
 
 
 def binomial_quantile(p: float | np.ndarray, n: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """Return a quantile of the binomial distribution as float64: the least k with P(B <= k) >= p.
+    """Return a quantile of the binomial distribution as float64: the smallest k with P(B <= k) >= p.
 
     docs/theory/estimators.md, (E8).
     """
@@ -135,7 +136,7 @@ def binomial_quantile(p: float | np.ndarray, n: np.ndarray, q: np.ndarray) -> np
 
 
 def ranks(count: np.ndarray, level: np.ndarray, confidence: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return ranks l < u with P(l <= B < u) >= confidence, B the binomial number of values below the quantile.
+    """Return ranks l < u with P(l <= B < u) >= confidence; B is the binomial number of values below the quantile.
 
     docs/theory/estimators.md, (E8).
     """

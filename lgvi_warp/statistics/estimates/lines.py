@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The numbers of an estimate at its end, with their labels, as a table and a prompt show them."""
+"""The numbers of an estimate at its end, with their labels, as a table or a prompt shows them."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ Line = tuple[str, float, float, float]
 
 
 def _labels(estimate: Any) -> list[str]:
-    """Label of each component, preceded by the type of the statistic unless it was given a name."""
+    """Label of each component, after the type of the statistic unless the statistic has a name."""
     kind, components = estimate.settings["type"], estimate.coordinates["component"].tolist()
     if len(components) == 1:
         return [estimate.name]
@@ -82,7 +82,7 @@ def _outcome(estimate: Any) -> Iterator[Line]:
 
 
 def _times(estimate: Any, name: str) -> Iterator[Line]:
-    """A line for the time by which each level is reached."""
+    """Lines for the times at which the levels are reached."""
     for j, level in enumerate(estimate.coordinates["level"]):
         value, lower, upper = (float(estimate[f"{name}{end}"][j]) for end in ("", "_lower", "_upper"))
         yield f"{estimate.name}: time [s] of {level:g}", value, lower, upper

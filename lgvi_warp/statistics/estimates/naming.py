@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Names of statistics: one spelling of numbers in them, and variables' names for xarray and NetCDF."""
+"""Names of statistics: a unique spelling of numbers, and names of variables for xarray and NetCDF."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ _MINUS = re.compile(r"(?<!\w)-(?=[\d.])|(?<=\de)-(?=\d)")
 
 
 def spelled(value: Any) -> str:
-    """Return a number, or several, as names spell them: 10 for 10.0, (2, -0.5) for [2.0, -0.5]; with all digits needed."""
+    """Return a number, or several, as spelled in names: 10 for 10.0, (2, -0.5) for [2.0, -0.5]; with all needed digits."""
     numbers = np.asarray(value, dtype=np.float64)
     texts = [repr(number + 0.0).removesuffix(".0") for number in numbers.ravel().tolist()]
     return texts[0] if len(texts) == 1 else f"({', '.join(texts)})"
 
 
 def canonical(name: str) -> str:
-    """Return a name as all its spellings have it: "above 10" for "above 10.0", "attitude[0,1]" for "attitude[0, 1]"."""
+    """Return the unique spelling of a name: "above 10" for "above 10.0", "attitude[0,1]" for "attitude[0, 1]"."""
     return _SPACE.sub("", _NUMBER.sub(lambda match: spelled(float(match[0])), name))
 
 
@@ -35,7 +35,7 @@ def word(name: str) -> str:
 
 
 def free(name: str, variables: Callable[[str], Iterable[str]], taken: set[str]) -> str:
-    """Return the name's `word`, with a number after it where one of its variables is taken already."""
+    """Return the name's `word`, followed by a number if one of its variables already exists."""
     first, number = word(name), 1
     candidate = first
     while taken & set(variables(candidate)):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Comparison of two cases on the same members: intervals of differences, tests, and the correction for many of them."""
+"""Comparison of two cases on the same members: intervals of differences, tests, and correction for multiple tests."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ DRAWN_AT_ONCE = 2_000_000
 
 
 class Difference(NamedTuple):
-    """A difference between two cases, second less first."""
+    """A difference between two cases, second minus first."""
 
     value: float
     lower: float
@@ -28,9 +28,9 @@ class Difference(NamedTuple):
 
 
 def proportions(only_first: int, only_second: int, pairs: int, confidence: float) -> Difference:
-    """Return the difference of two proportions of the same members, from the members that differ.
+    """Return the difference of two proportions of the same members, from the members whose results differ.
 
-    Tango's score interval (1998, Statistics in Medicine 17); McNemar's exact test of the members that differ.
+    It has Tango's score interval (1998, Statistics in Medicine 17) and McNemar's exact test.
     """
     from scipy.special import bdtr
 
@@ -56,7 +56,7 @@ def proportions(only_first: int, only_second: int, pairs: int, confidence: float
 
 
 def _score(delta: float, more: int, less: int, n: int) -> float:
-    """Tango's score statistic of a difference delta, by the constrained estimate of the smaller discordant probability."""
+    """Tango's score statistic for a difference delta, by the constrained estimate of the smaller discordant probability."""
     a, b, c = 2.0 * n, -more - less + (2.0 * n - more + less) * delta, -less * delta * (1.0 - delta)
     q = (np.sqrt(max(b * b - 4.0 * a * c, 0.0)) - b) / (2.0 * a)
     variance = n * (2.0 * q + delta * (1.0 - delta))
@@ -67,7 +67,7 @@ def _score(delta: float, more: int, less: int, n: int) -> float:
 
 
 def means(first: np.ndarray, second: np.ndarray, confidence: float) -> Difference:
-    """Return the difference of two means (n,) over the pairs that are finite: Student's t of the differences."""
+    """Return the difference of two means over the finite pairs (n,), by Student's t for the differences."""
     from scipy.special import stdtr
 
     both = np.isfinite(first) & np.isfinite(second)
@@ -85,12 +85,12 @@ def means(first: np.ndarray, second: np.ndarray, confidence: float) -> Differenc
 def quantiles(
     first: np.ndarray, second: np.ndarray, level: float, confidence: float, resamples: int = 999, seed: int = 0
 ) -> Difference:
-    """Return the difference of two quantiles over the pairs (n,) that are finite: percentiles of a smoothed bootstrap.
+    """Return the difference of two quantiles over the finite pairs (n,), by percentiles of a smoothed bootstrap.
 
-    A resample draws members with both numbers, and moves them by a normal kernel whose covariance is that of the numbers
-    times the square of KERNEL n^(-1/5) (4 level (1 - level))^(-1/4), wider where values are scarce: without it a resample's
-    quantiles are among few values, and the interval is too wide by up to a half (Hall, DiCiccio & Romano 1989, Annals of
-    Statistics 17).
+    A resample draws members with both numbers, and adds normal noise. Its covariance is the numbers' covariance times
+    the square of KERNEL n^(-1/5) (4 level (1 - level))^(-1/4), larger if values are scarce. Without this noise a
+    resample's quantiles take only few values, and the interval is too wide by up to a half (Hall, DiCiccio & Romano
+    1989, Annals of Statistics 17).
     """
     both = np.isfinite(first) & np.isfinite(second)
     x = np.stack([first[both], second[both]])
@@ -117,7 +117,7 @@ def quantiles(
 
 
 def holm(p: np.ndarray) -> np.ndarray:
-    """Return p-values (m,) corrected for their number (Holm 1979), at most 1; NaN, no test made, does not count."""
+    """Return p-values (m,) corrected for their number (Holm 1979), at most 1; NaN means no test and does not count."""
     corrected = np.full(len(p), np.nan)
     order = np.argsort(p)[: np.count_nonzero(~np.isnan(p))]
     factors = np.arange(len(order), 0, -1)

@@ -2,15 +2,15 @@
 """A sketch of sorted values: quantiles of any number of values from a few thousand, with a proven bound on the rank.
 
 A tree of buffers after Munro & Paterson (1980) with the coin flips of Karnin, Lang & Liberty (2016). Two sorted buffers
-whose values have the weight w each are merged, and every other value is kept with the weight 2 w; a coin decides
-whether the first or the second of each pair. If the first is kept, the count of values up to any number grows by w or
-not at all; if the second, it falls by w or not at all. Half of that change is known from the coin and corrected by
-`shift`, so that the rank errs by at most w / 2, up or down with the coin. For N values in buffers of s the sum of these
-bounds is at most N (log2(N / s) + 2) / (4 s), proven for every order and any coins; the sum of their squares is at most
-(N / 2 s)^2, so that the error exceeds t N / 2 s with a probability below 2 exp(-t^2 / 2) (Hoeffding 1963). The coin of
-a merge depends only on its place in the tree: the sketch of a set of blocks has the same bits in whatever order they
-come. Many streams (times, components) of the same number of values share coins and one array. Values that do not count
-are +inf: they leave the ranks of the others unchanged.
+whose values have weight w are merged, and every other value is kept with weight 2 w; a coin decides whether this is the
+first or the second of each pair. If the first is kept, the count of values up to any number grows by w or stays the
+same; if the second, it falls by w or stays the same. Half of this change is known from the coin and corrected by
+`shift`, so the rank error of a merge is at most w / 2, with a sign that depends on the coin. For N values in buffers of
+s, the sum of these bounds is at most N (log2(N / s) + 2) / (4 s), for every order and any coins. The sum of their
+squares is at most (N / 2 s)^2, so the error exceeds t N / 2 s with a probability below 2 exp(-t^2 / 2) (Hoeffding
+1963). The coin of a merge depends only on its place in the tree, so the sketch of a set of blocks has the same bits for
+any order of arrival. Many streams (times, components) with the same number of values share coins and one array. Values
+that do not count are +inf: they leave the ranks of the others unchanged.
 """
 
 from __future__ import annotations
@@ -24,15 +24,15 @@ from lgvi_warp.statistics.estimates.tree import Part
 
 
 def coin(level: int, place: int, sides: int) -> int:
-    """Return a pseudo-random whole number from 0 to sides - 1 that depends on the place alone: the same for every run."""
+    """Return a pseudo-random whole number from 0 to sides - 1 that depends only on the place, so every run has the same."""
     digest = hashlib.blake2b(b"%d %d" % (level, place), digest_size=8).digest()
     return int.from_bytes(digest, "little") % sides
 
 
 def sketch_of(x: np.ndarray, members: int, size: int, block: int) -> Part:
-    """Return the sketch of one block of values (k, d, n), +inf where a member does not count.
+    """Return the sketch of one block of values (k, d, n), +inf if a member does not count.
 
-    Returns: values (k, d, m) in order, their weights (m,), and error, variance and shift of the rank, (1,) each.
+    Returns: sorted values (k, d, m), their weights (m,), and error, variance and shift of the rank, (1,) each.
     """
     k, d, n = x.shape
     values = np.empty((k, d, max(members, n)), x.dtype)
@@ -54,14 +54,14 @@ def _part(values: np.ndarray, weights: np.ndarray, error: float, variance: float
 
 
 def merged(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """Merge rows of two arrays sorted along the last axis: NumPy's stable sort detects the two runs and merges them."""
+    """Merge rows of two arrays that are sorted along the last axis: NumPy's stable sort merges two sorted runs."""
     both = np.concatenate([first, second], axis=2)
     both.sort(axis=2, kind="stable")
     return both
 
 
 def join(first_part: Part, second_part: Part, size: int, place: tuple[int, int]) -> Part:
-    """Return the sketch of two of equal weight and length; place: (level, index) of the result in the tree of blocks.
+    """Join two sketches of equal weight and length; place: (level, index) of the result in the tree of blocks.
 
     docs/theory/estimators.md, (E9).
     """
@@ -79,7 +79,7 @@ def join(first_part: Part, second_part: Part, size: int, place: tuple[int, int])
 
 
 def together(parts: Sequence[Part]) -> Part:
-    """Return sketches of any weights side by side, as one part."""
+    """Concatenate sketches of any weights to one part."""
     values = np.concatenate([part["values"] for part in parts], axis=2)
     weights = np.concatenate([part["weights"] for part in parts])
     numbers = (float(sum(part[key][0] for part in parts)) for key in ("error", "variance", "shift"))
@@ -87,9 +87,9 @@ def together(parts: Sequence[Part]) -> Part:
 
 
 def sorted_values(part: Part) -> tuple[np.ndarray, np.ndarray]:
-    """Return the values of a sketch in order, and their ranks from 0, both (k, d, m).
+    """Return the sorted values of a sketch, and their ranks from 0, both (k, d, m).
 
-    A rank is the middle of those that the value represents, corrected by the shift.
+    A rank is the middle of the ranks that the value represents, corrected by the shift.
     """
     values, weights = part["values"], part["weights"]
     if np.all(weights == 1):
@@ -102,7 +102,7 @@ def sorted_values(part: Part) -> tuple[np.ndarray, np.ndarray]:
 
 
 def fraction(parts: Sequence[Part], x: np.ndarray) -> np.ndarray:
-    """Return the fraction of the members whose values do not exceed numbers (k, q, d); NaN where no member counts."""
+    """Return the fraction of members whose values do not exceed numbers (k, q, d); NaN if no member counts."""
     below = sum(
         part["weights"][0] * np.count_nonzero(part["values"][:, None] <= x[..., None], axis=3) - part["shift"][0]
         for part in parts
@@ -112,9 +112,9 @@ def fraction(parts: Sequence[Part], x: np.ndarray) -> np.ndarray:
 
 
 def at_rank(values: np.ndarray, middles: np.ndarray, finite: np.ndarray, rank: np.ndarray) -> np.ndarray:
-    """Return values (k, q, d) at given ranks from 0, linear between the finite values kept; NaN where none is finite.
+    """Return values (k, q, d) at given ranks from 0, interpolated linearly between finite values; NaN if none is finite.
 
-    values, middles, finite: (k, d, m), in order, with their ranks, and which are finite.
+    values, middles, finite: (k, d, m), the sorted values, their ranks, and the mask of finite values.
     """
     k, d = values.shape[:2]
     interpolated = np.full(rank.shape, np.nan)

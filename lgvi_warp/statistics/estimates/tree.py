@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Parts of blocks joined pairwise in an order fixed by the blocks' numbers: accurate sums with reproducible bits."""
+"""Parts of blocks, joined pairwise in a fixed order of block numbers: accurate, bit-reproducible sums."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ Join = Callable[[Part, Part, tuple[int, int]], Part]
 
 
 def arrays_under(arrays: Mapping[str, np.ndarray], head: str) -> Part:
-    """The arrays whose names begin with a head, named without it."""
+    """The arrays whose names begin with `head`; the head is removed."""
     return {name.removeprefix(head): array for name, array in arrays.items() if name.startswith(head)}
 
 
 class Tree:
-    """The parts of the blocks so far, joined pairwise: at most one part for each level, of 2^level blocks.
+    """Parts of the blocks so far, joined pairwise: at most one part for each level, of 2^level blocks.
 
-    The part (level, i) covers the blocks from i 2^level on. It is joined from its two halves as soon as both have come,
-    so that it does not depend on the order in which blocks come.
+    The part (level, i) covers the blocks from i 2^level on. It is joined from its two halves as soon as both have
+    arrived, so it does not depend on the order in which blocks arrive.
     """
 
     def __init__(self, join: Join):
         self._join, self._parts = join, dict[tuple[int, int], Part]()
 
     def add(self, block: int, part: Part) -> None:
-        """Take in the part of one block."""
+        """Add the part of one block."""
         level, i = 0, block
         while (neighbour := self._parts.pop((level, i ^ 1), None)) is not None:
             earlier, later = (neighbour, part) if i % 2 else (part, neighbour)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Sorted values of weighted members, thinned to a number of values: quantiles of any number of members.
+"""Sorted values of weighted members, thinned to a fixed number of values: quantiles of any number of members.
 
-A value stands for some weight, and for the sum of the squares of the weights behind it. Where there are more than `size`
-values, `size` of equal weight are kept: those at the middles of equal shares of the weight. The fraction below any number
-then changes by at most half a share, 1 / (2 size). The bits depend on the tree of blocks alone.
+A value represents some weight, and the sum of the squared weights of its members. If there are more than `size` values,
+`size` values of equal weight are kept: those at the middles of equal shares of the weight. The fraction below any
+number then changes by at most half a share, 1 / (2 size). The bits depend only on the tree of blocks.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from lgvi_warp.statistics.estimates.tree import Part
 
 
 def sketch_of(x: np.ndarray, weights: np.ndarray, size: int) -> Part:
-    """Return the sketch of a block of values (k, d, n), +inf where a member does not count, with their weights (k, n)."""
+    """Return the sketch of a block of values (k, d, n), +inf if a member does not count, with weights (k, n)."""
     mass = np.broadcast_to(weights[:, None], x.shape)
     order = np.argsort(x, axis=2, kind="stable")
     values, mass = np.take_along_axis(x, order, axis=2), np.take_along_axis(mass, order, axis=2)
@@ -24,7 +24,7 @@ def sketch_of(x: np.ndarray, weights: np.ndarray, size: int) -> Part:
 
 
 def together(parts: Sequence[Part], size: int | None) -> Part:
-    """Return sketches as one, of at most `size` values; None: of all of theirs."""
+    """Join sketches to one with at most `size` values; None keeps all values."""
     joined = {name: np.concatenate([part[name] for part in parts], axis=2) for name in ("values", "mass", "squares")}
     order = np.argsort(joined["values"], axis=2, kind="stable")
     joined = {name: np.take_along_axis(array, order, axis=2) for name, array in joined.items()}
@@ -33,7 +33,7 @@ def together(parts: Sequence[Part], size: int | None) -> Part:
 
 
 def _thinned(part: Part, size: int) -> Part:
-    """Keep `size` values of equal weight, where there are more; `rank_error` (k,) bounds the weight by which ranks are off."""
+    """Keep `size` values of equal weight, if there are more; `rank_error` (k,) bounds the error of ranks, as weight."""
     values, mass, squares = part["values"], part["mass"], part["squares"]
     k, d, n = values.shape
     if n <= size:
@@ -55,10 +55,10 @@ def _thinned(part: Part, size: int) -> Part:
 
 
 def sorted_values(part: Part, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the values in order, their places from 0 to 1, and the squares of weights up to each, all (k, d, m).
+    """Return the sorted values, their places from 0 to 1, and the cumulative squared weights, all (k, d, m).
 
-    The place of a value is the middle of what it stands for; the first has 0 and the last 1, as np.quantile has it. The values
-    that do not count have places beyond 1. weight: (k,), the sum of the weights.
+    The place of a value is the middle of the weight that it represents, scaled so that the first is at 0 and the last
+    at 1, as in np.quantile. Values that do not count have places beyond 1. weight: (k,), the sum of the weights.
     """
     values, mass = part["values"], part["mass"]
     counts = np.isfinite(values) & (mass > 0.0)
@@ -71,7 +71,7 @@ def sorted_values(part: Part, weight: np.ndarray) -> tuple[np.ndarray, np.ndarra
 
 
 def at_fraction(values: np.ndarray, places: np.ndarray, fraction: np.ndarray) -> np.ndarray:
-    """Return the values (k, q, d) at fractions (k, q, d) or (q, 1), linear between those kept; NaN where none counts."""
+    """Return values (k, q, d) at fractions (k, q, d) or (q, 1), interpolated linearly; NaN if no member counts."""
     k, d = values.shape[:2]
     fraction = np.broadcast_to(fraction, (k, *np.shape(fraction)[-2:-1], d))
     quantiles = np.full(fraction.shape, np.nan)
@@ -84,7 +84,7 @@ def at_fraction(values: np.ndarray, places: np.ndarray, fraction: np.ndarray) ->
 
 
 def squares_below(values: np.ndarray, squares: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """Return the sum (k, q, d) of the squared weights of values up to numbers x (k, q, d)."""
+    """Return the sum (k, q, d) of squared weights of values up to numbers x (k, q, d)."""
     k, d = values.shape[:2]
     below = np.zeros(x.shape)
     for i in range(k):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Metrics of what a controller does, of how long members last, and the user's own."""
+"""Metrics of commands, actuators and energy, the time to failure, and custom metrics."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ AT_LIMIT = 1.0 - 1e-6
 
 
 class _AllOf(Quantity):
-    """Numbers of the samples side by side, as many as the scene has: (k, d, n) with d not known before the run."""
+    """All numbers of some samples, concatenated: (k, d, n), where d is not known before the run."""
 
     def __call__(self, samples: Fields, members: Members) -> np.ndarray:
         k, n = len(samples.time), members.count
@@ -36,21 +36,22 @@ class _AllOf(Quantity):
 
 
 def all_of(*names: str) -> Quantity:
-    """Return all numbers of some samples as a quantity."""
+    """Return all numbers of some samples as one quantity."""
     return _AllOf(", ".join(names), _nothing, field_of(names[0]).unit if names[0] in SIGNALS else "", ordered(names))
 
 
 def _nothing(samples: Fields, members: Members) -> np.ndarray:
-    """Empty inputs for numbers that need no samples."""
+    """Empty input for metrics that need no samples."""
     return np.zeros((len(samples.time), members.count))
 
 
 @dataclass(frozen=True, eq=False)
 class OfChannels(Total):
-    """A metric of all channels of a signal, or of one. Abstract.
+    """A metric of all channels of a signal, or of one channel. Abstract.
 
     Args:
-        of: "command" or "actuator", for the sum over all channels, whatever their units; or one of them, "command[2]".
+        of: "command" or "actuator", for the sum over all channels, regardless of their units; or one channel,
+            "command[2]".
     """
 
     def meant(self) -> Quantity:
@@ -69,8 +70,8 @@ _ALL = {name: all_of(name) for name in CHANNELS}
 class Effort(OfChannels):
     """The integral over time of |command|, summed over channels [unit of the commands, s]; then statistics over members.
 
-    A command counts from its tick to the next one: exact, since it is held between them. Faults are included, delays are
-    not.
+    A command counts from its tick to the next, which is exact, since it is held in between. Faults are included, delays
+    are not.
 
     Args:
         of: "command" (the default), "actuator", or one channel, "command[2]".
@@ -86,10 +87,10 @@ class Effort(OfChannels):
 
 @dataclass(frozen=True, eq=False)
 class Travel(OfChannels):
-    """Travel of the actuators, |change| from tick to tick summed over channels [unit of the commands]; then statistics.
+    """Travel of the actuators: |change| from tick to tick, summed over channels [unit of the commands]; then statistics.
 
     Args:
-        of: "actuator" (the default: where they are, after delay, fault, limit and lag), "command", or one channel.
+        of: "actuator" (the default: actual positions after delay, fault, limit and lag), "command", or one channel.
     """
 
     type: ClassVar[str] = "travel"
@@ -100,7 +101,7 @@ class Travel(OfChannels):
 
 
 def _saturated(samples: Fields, members: Members) -> np.ndarray:
-    """Whether some command is at its limit or beyond, (k, n)."""
+    """Mask (k, n) of members with some command at or beyond its limit."""
     at_limit = np.zeros((len(samples.time), members.count), bool)
     for key, (row, count) in samples.controller.bus.commands.items():
         limit = members.parameters.get(f"{key}.limit")
@@ -111,9 +112,9 @@ def _saturated(samples: Fields, members: Members) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class SaturationShare(OfOne, Total):
-    """Share of each member's time under way in which a command is at its limit or beyond [1]; then statistics over members.
+    """Fraction of each member's time under way with some command at or beyond its limit [1]; then statistics over members.
 
-    Limits are those of the terms that take the commands, `limit`; one without a limit never saturates.
+    Limits are the `limit` of the terms that take the commands; a term without a limit never saturates.
 
     Args:
         of: "command", the default.
@@ -133,7 +134,7 @@ class SaturationShare(OfOne, Total):
 
 
 def _wrench_and_twist(samples: Fields, members: Members) -> np.ndarray:
-    """The actuators' wrench and the vehicle's motion over ground (k, n, 12), and whether the former is held between ticks."""
+    """The actuators' wrench and the vehicle's motion over ground (k, n, 12); also whether the wrench is held."""
     names = ("exerted", "velocity", "angular_velocity")
     columns = [samples[name].astype(np.float64, copy=False) for name in names]
     slow = any(term.memory for term in samples.controller.actuators.values())
@@ -144,13 +145,12 @@ def _wrench_and_twist(samples: Fields, members: Members) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class ActuatorEnergy(OfOne, Total):
-    """The integral over time of |power| that the actuators' wrench gives to the motion [J]; then statistics over members.
+    """The integral over time of the |power| of the actuators' wrench on the motion [J]; then statistics over members.
 
-    The power is exerted . (velocity, angular velocity): of the forces that the actuators exert after limits, lags, the loss
-    by the advance speed, and faults, known to the controller or not. Between ticks the trapezoidal rule applies; without
-    lags, limited rates and delays, with the wrench of the first tick, which is held until the next one. The energy is
-    mechanical, without the losses of motors and propellers. `ElectricalEnergy` includes these, in a scene with an energy
-    account.
+    The power is exerted . (velocity, angular velocity). `exerted` is the wrench after limits, lags, the loss by the
+    advance speed, and faults, known to the controller or not. Between ticks the trapezoidal rule applies; without lags,
+    limited rates and delays, the wrench of a tick is held until the next tick. The energy is mechanical, without the
+    losses of motors and propellers. `ElectricalEnergy` includes these losses, in a scene with an energy account.
 
     Args:
         of: "exerted", the default.
@@ -179,8 +179,8 @@ class ActuatorEnergy(OfOne, Total):
 class ElectricalEnergy(OfOne, Total):
     """The energy that each member uses [J], by the account of `lw.terms.EnergyUse`; then statistics over members.
 
-    It is the energy used between the first tick and the last: electrical, with the hotel load and all losses that terms
-    state. In a sweep over a scene with this account, "energy" means this metric, too.
+    It is the electrical energy used between the first and the last tick, with the hotel load and all losses that the
+    terms define. In a sweep over a scene with this account, "energy" also means this metric.
 
     Args:
         of: "energy_used", the default.
@@ -197,10 +197,10 @@ class ElectricalEnergy(OfOne, Total):
 
 @dataclass(frozen=True, eq=False)
 class TimeToFailure(OfOne):
-    """Time at which each member failed or an event stopped it [s], infinite at the end; then statistics over members.
+    """Time at which each member failed or an event stopped it [s], else infinite; then statistics over members.
 
-    Only lw.statistics.MemberValues() includes all members: other statistics exclude infinite times, and members that
-    failed. lw.statistics.Outcome is the probability to have ended by each time.
+    Only lw.statistics.MemberValues() includes all members: other statistics exclude infinite times and failed members.
+    lw.statistics.Outcome gives the probability that a member has ended by each time.
 
     Args:
         of: "end", the default.
@@ -223,7 +223,7 @@ class TimeToFailure(OfOne):
 
 
 class TickSamples(dict[str, np.ndarray]):
-    """Input of a user's metric at one tick: samples (n, ...) by name, the time t [s], and dt [s] since the tick before."""
+    """Input of a custom metric at one tick: samples (n, ...) by name, time t [s], and time dt [s] since the last tick."""
 
     def __init__(self, samples: Mapping[str, np.ndarray], t: float, dt: float):
         super().__init__(samples)
@@ -232,19 +232,20 @@ class TickSamples(dict[str, np.ndarray]):
 
 @dataclass(frozen=True, eq=False)
 class CustomMetric(Metric):
-    """A metric of the user's own: a function of each tick of a block of members in turn; then statistics over members.
+    """A custom metric: a function that is called at each tick of a block of members; then statistics over members.
 
-    The function is called as function(state, tick): `state` is None at the first tick, then what the function returned at the
-    tick before; `tick` has the samples of n members by name, tick["position"] (n, 3), and tick.t, tick.dt [s]. It returns
-    numbers (n,), or (m, n) for m numbers of each member. A member that is no longer under way keeps its last state.
+    The function is called as function(state, tick). `state` is None at the first tick, then the return value at the
+    tick before. `tick` has the samples of n members by name, such as tick["position"] (n, 3), and tick.t, tick.dt [s].
+    The function returns numbers (n,), or (m, n) for m numbers of each member. A member that is no longer under way
+    keeps its last state.
 
     Args:
-        of: the function; its name is the metric's.
+        of: the function; the metric has its name.
         fields: names of the samples that the function reads, as for lw.SaveAt.
-        last: function of the last state that returns the metric (n,); by default the state itself.
+        last: function from the last state to the metric (n,); by default the metric is the last state.
         unit_of: unit of the metric, a text; by default "1".
-        version: text or number that identifies the functions in sweeps and stores; change it whenever they change; by
-            default None: their code identifies them.
+        version: text or number that identifies the functions in sweeps and stores; change it whenever the functions
+            change. None, the default: their code identifies them.
     """
 
     type: ClassVar[str] = "own_metric"

@@ -31,16 +31,17 @@ FIELDS = ("position", "attitude", "velocity")
 class DockContact(Metric):
     """First passage of each member through the plane of its dock within its mouth; then statistics over members.
 
-    The dock is that of a guidance `lw.control.Docking`. Between two ticks the path is the cubic through their positions and
-    velocities. A member that did not dock has no number (NaN), and is left out of statistics.
+    The dock belongs to a guidance `lw.control.Docking`. Between two ticks the path is the cubic through their positions
+    and velocities. A member that did not dock has no number (NaN), and is left out of statistics.
 
     Args:
-        of: "speed": ahead along the centre line, over ground [m/s]; "offset": distance of the origin from the centre line [m];
-            "heading_error": heading less that of the dock, in [-pi, pi] [rad]; "time": when [s].
+        of: "speed": speed over ground along the centre line [m/s]; "offset": distance of the body's origin from the
+            centre line [m]; "heading_error": heading minus the dock's heading, in [-pi, pi] [rad]; "time": time of the
+            entry [s].
         docking: name of the guidance; by default "docking".
 
     Raises:
-        SceneError: if `of` is none of these; at the start of a run, if the scene has no such guidance.
+        SceneError: if `of` is none of these; or, at the start of a run, if the scene has no such guidance.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -100,9 +101,10 @@ class DockContact(Metric):
         return {"contact": contact}
 
     def _at_plane(self, a: np.ndarray, b: np.ndarray, t: np.ndarray, dt: np.ndarray) -> tuple[np.ndarray, ...]:
-        """Requested quantity, distance from the centre line and radius of the mouth, where members meet the plane.
+        """Requested quantity, distance from the centre line and radius of the mouth, at the passage through the plane.
 
-        a, b: numbers at the ticks before and after it (8, m); t: time of the latter (m,) [s]; dt: between them (m,) [s].
+        a, b: numbers at the ticks before and after it (8, m); t: time of the later tick (m,) [s]; dt: time between them
+            (m,) [s].
         """
         low, high = np.zeros(len(t)), np.ones(len(t))
         for _ in range(HALVINGS):
@@ -122,13 +124,13 @@ class DockContact(Metric):
 
 
 def _along(v: np.ndarray, heading: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Parts of inertial vectors (..., n, 3) against a heading (1 or n,), to starboard of it, and downward."""
+    """Components of inertial vectors (..., n, 3) opposite to a heading (1 or n,), to starboard of it, and downward."""
     c, s = np.cos(heading), np.sin(heading)
     return -(c * v[..., 0] + s * v[..., 1]), c * v[..., 1] - s * v[..., 0], v[..., 2]
 
 
 def _between(a: np.ndarray, b: np.ndarray, rate_a: np.ndarray, rate_b: np.ndarray, s: np.ndarray) -> np.ndarray:
-    """The cubic from a to b whose slopes at the ends are these, over an interval of 1, at s."""
+    """The cubic from a to b with given slopes at the ends of an interval of length 1, evaluated at s."""
     rise = b - a
     cubic, square = rate_a + rate_b - 2.0 * rise, 3.0 * rise - 2.0 * rate_a - rate_b
     return a + s * (rate_a + s * (square + s * cubic))

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The base of metrics: one number of each member, gathered tick by tick.
 
-A tick is a sample at a controller's period. With ticks at t_0 = 0, t_1, ... a member counts from the first tick to the last
-one at which it was still under way: a member that stops or fails has the numbers of its time under way.
+A tick is a sample at a controller's period. With ticks at t_0 = 0, t_1, ... a member counts from the first tick to the
+last tick at which it was still under way. So the number of a member that stops or fails covers its time under way.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ Place = tuple[int, int, int, int, np.ndarray | None]
 
 @dataclass(frozen=True, eq=False)
 class Ticks:
-    """Some ticks in turn: times t (k,) [s], steps dt (k,) [s] before each, and d numbers of n members, x (k, d, n).
+    """Successive ticks: times t (k,) [s], times dt (k,) [s] since the last tick, and d numbers of n members, x (k, d, n).
 
     start: (d, n), the numbers at the tick before the first.
-    alive: (k, n), which members were still under way; None if all were.
+    alive: (k, n), True for members still under way; None if all were.
     """
 
     t: np.ndarray
@@ -48,12 +48,12 @@ class Ticks:
         return np.concatenate([self.start[None], self.x[:-1]])
 
     def rows(self, *arrays: np.ndarray) -> Iterator[tuple[Any, ...]]:
-        """Yield for each tick its time, its row of each array (k, ...), and which members were under way."""
+        """Yield for each tick its time, its row of each array (k, ...), and the mask of members under way."""
         everyone: Any = [True] * len(self.t) if self.alive is None else self.alive
         yield from zip(self.t, *arrays, everyone, strict=True)
 
     def of_living(self, values: np.ndarray, otherwise: float) -> np.ndarray:
-        """Return values (k, n), with another number where a member was no longer under way."""
+        """Return values (k, n), with `otherwise` for members that were no longer under way."""
         return values if self.alive is None else np.where(self.alive, values, otherwise)
 
 
@@ -108,15 +108,15 @@ class _Follow(Gatherer):
 class Metric(MemberStatistic):
     """One number of each member over all ticks of a controller, then statistics over members. Abstract.
 
-    It takes the samples at every tick, whatever the run keeps; in a scene without a controller, at the times of samples. A
-    member that stops or fails has the number of its time under way, up to its last tick. Statistics leave out members that
-    failed, and those whose number is not finite; lw.statistics.MemberValues() has all of them.
+    It uses the samples at every tick, even if the run does not save them; without a controller, it uses the sample
+    times. The number of a member that stops or fails covers its time under way, up to its last tick. Statistics leave
+    out members that failed, and those whose number is not finite; lw.statistics.MemberValues() includes all members.
 
     Args:
-        of: what is tracked; see the classes derived from it.
-        then: Statistic of these numbers over the members, or a list, each without its `of`: lw.statistics.Mean(), the
-            default, lw.statistics.Quantiles(), ...
-        measured: Whether to use the number that sensors measure, in place of the true one; by default False.
+        of: the tracked quantity; see the derived classes.
+        then: Statistic of these numbers over the members, or a list of statistics, each without its `of`:
+            lw.statistics.Mean(), the default, lw.statistics.Quantiles(), ...
+        measured: True uses the number that sensors measure instead of the true number; by default False.
         stopped: not used by metrics; omit it.
     """
 
@@ -134,23 +134,24 @@ class Metric(MemberStatistic):
             faults.add("stopped", self.stopped, "has no meaning for a metric", "leave it out")
 
     def begin(self, x: np.ndarray) -> State:
-        """Return the state after the first tick, of its numbers (d, n)."""
+        """Return the state after the first tick, from its numbers (d, n)."""
         return {}
 
     def follow(self, state: State, ticks: Ticks) -> State:
-        """Return what changes of the state by some more ticks."""
+        """Return the entries of the state that change with the next ticks."""
         return {}
 
     def finish(self, state: State) -> np.ndarray:
         """Return the members' numbers (n,) from the state after the last tick.
 
-        The state also has "until" (n,) [s], each member's last tick under way, "ended" (n,) [s], when it stopped or failed,
-        else infinite, "failed" (n,), and "end" [s], that of the run; "ended_so" (n,), whether by its outcome, if it names one.
+        The state also has "until" (n,) [s], each member's last tick under way; "ended" (n,) [s], the time at which it
+        stopped or failed, else infinite; "failed" (n,); "end" [s], the end of the run; and "ended_so" (n,), True if it
+        ended by the metric's outcome, if any.
         """
         raise TypeError(f"{type(self).__name__} is abstract")
 
     def gathered(self, x: np.ndarray, lost: np.ndarray, place: Place, time: np.ndarray) -> Part:
-        """Return the part of a block: the parts of all statistics of `then`, of the numbers (replicates, 1, members).
+        """Return the part of a block: the parts of all statistics of `then`, for numbers (replicates, 1, members).
 
         place: first member, block, its size, number of replicates, and weights of the members.
         """
@@ -185,7 +186,7 @@ class Metric(MemberStatistic):
 
 @dataclass(frozen=True, eq=False)
 class OfOne(Metric):
-    """A metric of one quantity alone, its default. Abstract."""
+    """A metric of a single quantity, its default. Abstract."""
 
     # The quantity, and its name in a refusal.
     meaning: ClassVar[Quantity]
@@ -217,10 +218,10 @@ class Total(Metric):
 
 @dataclass(frozen=True, eq=False)
 class Largest(Metric):
-    """A metric of the largest of some numbers over ticks. Abstract."""
+    """A metric that is the maximum of a number over ticks. Abstract."""
 
     def size(self, state: State, x: np.ndarray) -> np.ndarray:
-        """Return the number (..., n) at ticks, of their numbers x (..., d, n)."""
+        """Return the number (..., n) at ticks, from their numbers x (..., d, n)."""
         raise TypeError(f"{type(self).__name__} is abstract")
 
     def begin(self, x: np.ndarray) -> State:
@@ -236,7 +237,7 @@ class Largest(Metric):
 
 
 def accumulated(total: np.ndarray, ticks: Ticks, parts: np.ndarray) -> np.ndarray:
-    """Return a sum (n,) with parts (k, n) added tick by tick, so that its bits do not depend on how many come at once."""
+    """Return a sum (n,) with parts (k, n) added tick by tick: its bits do not depend on the number of ticks at once."""
     total = total.copy()
     for addend in ticks.of_living(parts, 0.0):
         total += addend

@@ -25,19 +25,20 @@ UNITS = {"end": "m", "largest": "m", "percent": "%"}
 
 @dataclass(frozen=True, eq=False)
 class NavigationError(Metric):
-    """Length of the `navigation_error` of each member over its ticks; then statistics over members.
+    """Length of each member's `navigation_error` (estimated minus true position); then statistics over members.
 
-    "percent" is the error at the end over the length of the path over ground, by straight lines between ticks, as
+    "percent" is the error at the end divided by the length of the path over ground, by straight lines between ticks, as
     manufacturers state the error of logs and inertial systems. It is NaN for a member that does not move.
 
     Args:
-        of: "end", the default: at the last tick under way [m]; "largest": over all ticks of this run [m]; "percent": at the
-            end, as a part of the distance run [%], not for a run that goes on from another.
-        horizontal: Whether the length is that of the north and east components alone; by default False.
+        of: "end", the default: error at the last tick under way [m]; "largest": largest error over all ticks of this
+            run [m]; "percent": error at the end as a percentage of the distance travelled [%], not for a run that
+            continues another.
+        horizontal: True uses only the north and east components; by default False.
 
     Raises:
-        SceneError: if `of` is none of these; and as a run begins, where nothing estimates the position, or where "percent"
-            is asked of a run that goes on.
+        SceneError: if `of` is none of these; or, at the start of a run, if nothing estimates the position, or if
+            "percent" is requested for a run that continues another.
 
     Examples:
         >>> import lgvi_warp as lw

@@ -45,7 +45,7 @@ COUNTS = {Floor.type: 1, "surface": 1, "box": 6}
 
 
 def distance(event: Any, position: np.ndarray, number: Number) -> np.ndarray:
-    """The distance (...) [m] of positions (..., n, 3) to an event; number: its numbers by name, each (1 or n, ...)."""
+    """The distance (...) [m] of positions (..., n, 3) to an event; number: event's numbers by name, (1 or n, ...)."""
     still = np.zeros_like(position)
     return np.asarray(functools.reduce(np.minimum, _distances_and_rates(event, position, still, number)[0]))
 
@@ -53,7 +53,7 @@ def distance(event: Any, position: np.ndarray, number: Number) -> np.ndarray:
 def _distances_and_rates(
     event: Any, position: np.ndarray, velocity: np.ndarray, number: Number
 ) -> tuple[list[np.ndarray], list[np.ndarray]]:
-    """The distances (..., n) [m] to the sides of an event, and their rates [m/s], by velocities (..., n, 3), inertial axes."""
+    """The distances (..., n) [m] to the sides of an event, and their rates [m/s], for inertial velocities (..., n, 3)."""
     if isinstance(event, Floor):
         height, rate = event.height(position, velocity, {name: number(name) for name in event.parameters()})
         return [height], [rate]
@@ -65,7 +65,7 @@ def _distances_and_rates(
 
 
 def least_between(a: np.ndarray, b: np.ndarray, rate_a: np.ndarray, rate_b: np.ndarray) -> np.ndarray:
-    """The least value of the cubic from a to b whose slopes at the ends are these, over an interval of 1."""
+    """The smallest value of the cubic from a to b with given slopes at the ends of an interval of length 1."""
     rise = b - a
     cubic, square = rate_a + rate_b - 2.0 * rise, 3.0 * rise - 2.0 * rate_a - rate_b
     with np.errstate(all="ignore"):
@@ -80,18 +80,18 @@ def least_between(a: np.ndarray, b: np.ndarray, rate_a: np.ndarray, rate_b: np.n
 
 @dataclass(frozen=True, eq=False)
 class Nearest(Metric):
-    """Least distance of each member to an event over its path [m], 0 if the event stopped it; then statistics over members.
+    """Smallest distance of each member to an event [m], 0 if the event stopped it; then statistics over members.
 
-    The distance is evaluated at every tick of the controller; without a controller, at the sample times. Between two of
-    these the path is the cubic through their positions and velocities, so they may be several steps apart. For a member
-    that failed, or that another event stopped, the path until then counts.
+    The distance is evaluated at every tick of the controller; without a controller, at the sample times. Between two
+    such times the path is the cubic through their positions and velocities, so they may be several steps apart. For a
+    member that failed, or that another event stopped, the path up to this time counts.
 
     Args:
-        of: name of an event of the scene, "floor".
+        of: name of an event of the scene, such as "floor".
         kind: type of the event, "floor", "surface" or "box"; by default its name.
 
     Raises:
-        SceneError: if the event is of another type; at the start of a run, if the scene has no such event.
+        SceneError: if the event has another type; or, at the start of a run, if the scene has no such event.
 
     Examples:
         >>> import lgvi_warp as lw

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Metrics of how well a controller tracks what is wanted; definitions are those of control theory.
+"""Metrics of a controller's tracking performance, with the definitions of control theory.
 
-y is the actual number, r what is wanted at each tick, e = r - y.
+y is the actual number and r the desired number at each tick; e = r - y.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ ROUND_OFF = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class OfTracking(Metric):
-    """A metric of the error of tracking e = wanted - actual. Abstract.
+    """A metric of the tracking error e = desired - actual. Abstract.
 
     Args:
-        of: "depth", "heading" (differences wrapped to within pi), "speed" (ahead through the water, as measured), "north",
-            "east"; or a distance from what is wanted: "position", "attitude" (angle), "cross_track".
+        of: "depth", "heading" (differences wrapped to [-pi, pi]), "speed" (measured forward speed through the water),
+            "north", "east"; or a distance from the desired value: "position", "attitude" (angle), "cross_track".
     """
 
     tracks: ClassVar[bool] = True
@@ -39,15 +39,15 @@ class OfTracking(Metric):
 
 @dataclass(frozen=True, eq=False)
 class OfCourse(Metric):
-    """A metric of the way to a goal. Abstract.
+    """A metric of the approach to a goal. Abstract.
 
-    The goal is the set point of the scene, before any reference model; where other guidance leads, what is wanted at the
-    first tick. It is that of the first tick throughout. d is the goal less the actual number, s its value at the first tick
-    (the step); what is below or beyond is meant in the direction of the step, upward if the step is 0.
+    The goal is constant: the set point of the scene at the first tick, before any reference model; with other guidance,
+    the desired value at the first tick. d is the goal minus the actual number, and the step s is d at the first tick.
+    "Below" and "beyond" refer to the direction of the step, which is upward if the step is 0.
 
     Args:
-        of: "depth", "heading", "speed", "north" or "east". The goal is the set-point, before any reference model; with
-            other guidance, the wanted value at the first tick. The step goes from the first actual value to the goal.
+        of: "depth", "heading", "speed", "north" or "east". The goal is the set point, before any reference model; with
+            other guidance, the desired value at the first tick. The step goes from the first actual value to the goal.
     """
 
     tracks: ClassVar[bool] = True
@@ -62,7 +62,7 @@ class OfCourse(Metric):
         return {"goal": goal, "step": np.abs(step), "sign": np.where(step < 0.0, -1.0, 1.0)}
 
     def left(self, state: State, x: np.ndarray) -> np.ndarray:
-        """Return the way to the goal (..., n) in the direction of the step, of x (..., d, n): below 0 beyond the goal."""
+        """Return the distance to the goal (..., n) in the step's direction, from x (..., d, n): negative beyond the goal."""
         return state["sign"] * self._difference(state["goal"], x[..., 0, :])
 
     def _difference(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -71,11 +71,11 @@ class OfCourse(Metric):
 
 @dataclass(frozen=True, eq=False)
 class OfStep(OfCourse):
-    """A metric of the way to a goal that may be told as a part of the step. Abstract.
+    """A step-response metric that may be given in percent of the step. Abstract.
 
     Args:
-        percent: whether the number is in percent of the step, as python-control's step_info has it; by default False, in the
-            unit of what it is of. NaN where the step is 0.
+        percent: True gives the number in percent of the step, like step_info of python-control; it is NaN if the step
+            is 0. By default False: in the unit of the quantity.
     """
 
     percent: bool = False
@@ -85,7 +85,7 @@ class OfStep(OfCourse):
         return "%" if self.percent else super().unit
 
     def percent_of_step(self, state: State, size: np.ndarray) -> np.ndarray:
-        """Return a size (n,), in percent of the step where that is asked for."""
+        """Return a size (n,), in percent of the step if requested."""
         return np.where(state["step"] > 0.0, 100.0 * size / state["step"], np.nan) if self.percent else size
 
 
@@ -94,7 +94,7 @@ class Overshoot(Largest, OfStep):
     """Largest distance of each member beyond its goal [unit, or % of the step], 0 if none; then statistics over members.
 
     Args:
-        percent: whether in percent of the step; by default False.
+        percent: True gives it in percent of the step; by default False.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -124,7 +124,7 @@ class Undershoot(Largest, OfStep):
     """Largest distance of each member in the wrong direction [unit, or % of the step]; then statistics over members.
 
     Args:
-        percent: whether in percent of the step; by default False.
+        percent: True gives it in percent of the step; by default False.
     """
 
     type: ClassVar[str] = "undershoot"
@@ -160,10 +160,10 @@ class PeakTime(OfCourse):
 
 @dataclass(frozen=True, eq=False)
 class Peak(Overshoot):
-    """Value of each member where it is farthest in the direction of its step [unit]; then statistics over members.
+    """Value of each member at its farthest point in the direction of its step [unit]; then statistics over members.
 
-    A heading is not wrapped: it lies within pi of the goal. For a step from 0 the value is the Peak of python-control's
-    step_info.
+    A heading is not wrapped: it lies within pi of the goal. For a step from 0, the value is the Peak in step_info of
+    python-control.
     """
 
     type: ClassVar[str] = "peak"
@@ -176,11 +176,11 @@ class Peak(Overshoot):
 class RiseTime(OfCourse):
     """Time of each member from 10 % to 90 % of its step [s]; then statistics over members.
 
-    From the first tick with at least 10 % of the step done to the first one with at least 90 %. Infinite where a member never
-    gets there.
+    It lasts from the first tick at which at least 10 % of the step is done to the first tick with at least 90 %. It is
+    infinite if a member never gets there.
 
     Args:
-        limits: the two parts of the step; by default (0.1, 0.9).
+        limits: the two fractions of the step; by default (0.1, 0.9).
     """
 
     type: ClassVar[str] = "rise_time"
@@ -216,11 +216,11 @@ class RiseTime(OfCourse):
 class SettlingTime(OfCourse):
     """Time after which each member stays within a band about its goal [s]; then statistics over members.
 
-    The time of the first tick from which on |d| <= within at every tick under way; infinite for a member that is outside at
-    its last tick.
+    It is the time of the first tick from which |d| <= within at every tick under way; infinite for a member that is
+    outside the band at its last tick.
 
     Args:
-        within: half the width of the band, in the unit of the quantity; by default 2 % of each member's step.
+        within: half width of the band, in the unit of the quantity; by default 2 % of each member's step.
     """
 
     type: ClassVar[str] = "settling_time"
@@ -251,12 +251,12 @@ class SettlingTime(OfCourse):
 
 @dataclass(frozen=True, eq=False)
 class SteadyStateError(Total, OfTracking):
-    """The mean error over the last part of the run [unit], of its ticks; then statistics over members.
+    """The mean error over the ticks of the last part of the run [unit]; then statistics over members.
 
-    NaN for members that stopped or failed before the last tick.
+    It is NaN for members that stopped or failed before the last tick.
 
     Args:
-        share: the part of the run's time, above 0 to 1; by default 0.1.
+        share: the last part, as a fraction of the run's time, above 0 and up to 1; by default 0.1.
     """
 
     type: ClassVar[str] = "steady_state_error"
@@ -297,9 +297,9 @@ class MaxError(Largest, OfTracking):
 
 @dataclass(frozen=True, eq=False)
 class CrossTrack(MaxError):  # noqa: N818  (no exception)
-    """The largest horizontal distance of each member from the line through the wanted place along the wanted velocity [m].
+    """Each member's largest horizontal distance from the line through the desired position along the desired velocity [m].
 
-    Without a wanted velocity, the distance from the wanted place. Then statistics over members.
+    Without a desired velocity it is the distance from the desired position. Then statistics over members.
 
     Args:
         of: "cross_track", the default.
@@ -364,7 +364,7 @@ class ITAE(OverTime):
 
 @dataclass(frozen=True, eq=False)
 class RMSError(ISE):
-    """Root mean square of e over the time under way [unit], |e| where that time is 0; then statistics over members."""
+    """Root mean square of e over the time under way [unit], |e| if this time is 0; then statistics over members."""
 
     type: ClassVar[str] = "rms"
     form: ClassVar[str] = "{0}"

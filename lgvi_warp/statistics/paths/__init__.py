@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Statistics of one number of each member's path, and that number itself."""
+"""Statistics of one number of each member's path, and the number itself."""

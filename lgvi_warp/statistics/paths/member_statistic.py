@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Statistics of one number of each member, such as the maximum of its path or the time of its end."""
+"""Statistics of one number of each member, such as the maximum of its path or its end time."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from lgvi_warp.statistics.values.values import Values
 
 @dataclass(frozen=True, eq=False)
 class MemberStatistic(Statistic):
-    """One number for each component of each member, then statistics of that number. Abstract.
+    """One number for each component of each member, then statistics of this number. Abstract.
 
     Args:
-        of: see the classes derived from it.
-        then: statistic of these numbers over the members, or a list, each without its `of`: lw.statistics.Mean(),
-            lw.statistics.Quantiles(levels=(0.5, 0.99)), lw.statistics.Exceedance(above=2.0).
+        of: see the derived classes.
+        then: statistic of these numbers over the members, or a list of statistics, each without its `of`:
+            lw.statistics.Mean(), lw.statistics.Quantiles(levels=(0.5, 0.99)), lw.statistics.Exceedance(above=2.0).
     """
 
     then: Any = None
@@ -51,11 +51,11 @@ class MemberStatistic(Statistic):
                 self.parts()
 
     def then_default(self) -> Sequence[Statistic]:
-        """Return the statistics where `then` is not given."""
+        """Return the default of `then`."""
         return [Mean()]
 
     def then_of(self, time: np.ndarray) -> tuple[Statistic, ...]:
-        """Return the statistics of `then`, each of this class's number, over the run's sample times (k,) [s]."""
+        """Return the statistics of `then`, each with this class's number as `of`, over the run's sample times (k,) [s]."""
         inner = self.quantity
         derived = Quantity(self.key, inner.function, self.unit, inner.fields, self._labels, self.needs_limit)
         return tuple(replace(statistic.over(time), of=derived, stopped=self.stopped) for statistic in self.then)
@@ -67,7 +67,7 @@ class MemberStatistic(Statistic):
 
     @property
     def needs_limit(self) -> bool:
-        """Whether a condition on the number needs a limit."""
+        """True if a condition on the number needs a limit."""
         return self.quantity.needs_limit
 
     @property
@@ -78,7 +78,7 @@ class MemberStatistic(Statistic):
         return self.then_of(np.array([0.0, 1.0]))
 
     def gather(self, values: Values, time: np.ndarray) -> Part:
-        """Return the part of a block, of its members' numbers at one time: the parts of all of `then`, keys numbered."""
+        """Return the part of a block, from its members' numbers at one time: the numbered parts of all of `then`."""
         return numbered(part_of(statistic, values, time) for statistic in self.then_of(time))
 
     def join(self, first: Part, second: Part, place: tuple[int, int]) -> Part:
@@ -104,18 +104,18 @@ class MemberStatistic(Statistic):
         return estimates
 
     def _inner(self, parts: Sequence[Part], time: np.ndarray) -> Iterator[tuple[Statistic, list[Part]]]:
-        """Each statistic of `then` with its own parts."""
+        """Yield each statistic of `then` with its own parts."""
         for i, statistic in enumerate(self.then_of(time)):
             yield statistic, [arrays_under(part, f"{i}/") for part in parts]
 
 
 def part_of(statistic: Statistic, values: Values, time: np.ndarray) -> Part:
-    """The part of a statistic of numbers that are known at the end of the run alone."""
+    """The part of a statistic of numbers that are known only at the end of the run."""
     gatherer = statistic.open(time[-1:], values.x.shape[2])
     gatherer.take(values, slice(0, 1))
     return gatherer.close()
 
 
 def numbered(parts: Iterable[Part]) -> Part:
-    """Parts of several statistics as one: the number of the statistic stands before each name."""
+    """Join the parts of several statistics to one: each name begins with the number of its statistic."""
     return {f"{i}/{key}": array for i, part in enumerate(parts) for key, array in part.items()}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The number of every member, where statistics of them are not enough."""
+"""The numbers of all members, if statistics are not enough."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from lgvi_warp.statistics.values.values import Values
 
 @dataclass(frozen=True, eq=False)
 class MemberValues(Statistic):
-    """The number of every member, in the order of the members: eight bytes a member, component and row.
+    """The numbers of all members, in the order of the members: eight bytes per member, component and row.
 
-    It is meant for `then`, which has one row: lw.metrics.Overshoot("depth", then=[lw.statistics.Mean(),
-    lw.statistics.MemberValues()]). For a metric it includes the numbers of failed members; otherwise those of members that
-    are left out are NaN. It has no interval.
+    Use it in `then`, which has one row: lw.metrics.Overshoot("depth", then=[lw.statistics.Mean(),
+    lw.statistics.MemberValues()]). For a metric it includes the numbers of failed members; otherwise the numbers of
+    members that are left out are NaN. It has no interval.
 
     Arrays of the estimate:
 
     * value (k, d, n): the numbers.
-    * count (k,): number of members that have numbers, infinite ones among them.
+    * count (k,): number of members that have numbers, including infinite numbers.
 
     Args:
         of: A quantity, such as "depth" or "position[2]", a function of (samples, members), or a list of these

@@ -20,7 +20,7 @@ from lgvi_warp.statistics.values.values import Values
 
 
 class _Walk(Gatherer):
-    """Follows the paths of a block's members, sample by sample, and whether all samples counted."""
+    """Follows the paths of a block's members, sample by sample, and records whether all samples counted."""
 
     def __init__(self, statistic: OfPath, time: np.ndarray):
         self._statistic, self._time, self._reduction = statistic, time, statistic.reduction
@@ -59,16 +59,17 @@ class _Walk(Gatherer):
 
 @dataclass(frozen=True, eq=False)
 class OfPath(MemberStatistic):
-    """One number for each component of each member's whole path, then statistics of that number. Abstract.
+    """One number for each component of each member's whole path, then statistics of this number. Abstract.
 
-    Members that failed are left out: the rest of their path is not known. An estimate is named by both types: "mean
-    path_maximum speed". It has one row, at the end of the run.
+    Members that failed are left out, since the rest of their path is not known. The name of an estimate has both types:
+    "mean path_maximum speed". It has one row, at the end of the run.
 
     Args:
         of: A quantity, such as "depth" or "position[2]", a function of (samples, members), or a list of these
             (see lw.statistics.Quantity).
-        then: statistic of these numbers over the members, or a list, each without its `of`: lw.statistics.Mean() (the
-            default), lw.statistics.Quantiles(levels=(0.5, 0.99)), lw.statistics.Exceedance(above=2.0).
+        then: statistic of these numbers over the members, or a list of statistics, each without its `of`:
+            lw.statistics.Mean() (the default), lw.statistics.Quantiles(levels=(0.5, 0.99)),
+            lw.statistics.Exceedance(above=2.0).
     """
 
     of_numbers: ClassVar[bool] = False
@@ -87,8 +88,8 @@ class OfPath(MemberStatistic):
 class PathMaximum(OfPath):
     """The largest value of a quantity over all sample times of each member, then statistics over members.
 
-    Members that failed are left out: the rest of their path is not known. An estimate is named by both types: "mean
-    path_maximum speed". It has one row, at the end of the run.
+    Members that failed are left out, since the rest of their path is not known. The name of an estimate has both types:
+    "mean path_maximum speed". It has one row, at the end of the run.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -113,7 +114,7 @@ class PathMinimum(OfPath):
 
 @dataclass(frozen=True, eq=False)
 class PathRange(OfPath):
-    """The largest less the smallest value of a quantity over each member's sample times, then statistics over members."""
+    """The largest minus the smallest value of a quantity over each member's sample times, then statistics over members."""
 
     type: ClassVar[str] = "path_range"
     _reduction: ClassVar[Reduction] = reductions.RANGE
@@ -121,10 +122,10 @@ class PathRange(OfPath):
 
 @dataclass(frozen=True, eq=False)
 class PathMean(OfPath):
-    """The average over time of a quantity of each member, then statistics over members.
+    """The average over time of a quantity for each member, then statistics over members.
 
-    Linear between samples: the trapezoidal rule over the sample times, divided by the time from the first to the last.
-    With one sample it is that sample.
+    The quantity is linear between samples: trapezoidal rule over the sample times, divided by the time from the first
+    to the last. With a single sample it is this sample.
     """
 
     type: ClassVar[str] = "path_mean"
@@ -133,9 +134,9 @@ class PathMean(OfPath):
 
 @dataclass(frozen=True, eq=False)
 class PathRms(OfPath):
-    """The root of the average over time of a quantity's square for each member, then statistics over members.
+    """The root mean square over time of a quantity for each member, then statistics over members.
 
-    The square is taken as linear between samples.
+    The square is assumed to be linear between samples.
     """
 
     type: ClassVar[str] = "path_rms"
@@ -144,15 +145,15 @@ class PathRms(OfPath):
 
 @dataclass(frozen=True, eq=False)
 class PathTime(OfPath, Condition):
-    """Time [s] for which a condition holds in each member, then statistics over members: "mean path_time depth above 2".
+    """Time [s] for which a condition holds for each member, then statistics over members: "mean path_time depth above 2".
 
-    Linear between samples: a time between two samples counts by the fraction of the line between them that satisfies
-    the condition. A quantity that is true or false has no line: half of the time counts for each of its ends at which
-    it holds.
+    The quantity is linear between samples: an interval counts by the fraction of its line that satisfies the condition.
+    A quantity that is true or false has no line: half of an interval counts for each of its ends at which the condition
+    holds.
 
     Args:
-        above: one number, or one for each component, in the quantity's unit.
-        below: the same for the upper limit; with both, the time between them.
+        above: lower limit, one number or one for each component, in the quantity's unit.
+        below: upper limit, in the same form; with both, the time between them counts.
     """
 
     type: ClassVar[str] = "path_time"
@@ -188,7 +189,7 @@ class PathTime(OfPath, Condition):
 
 
 def _part(beyond: np.ndarray, length: np.ndarray) -> np.ndarray:
-    """Fraction of lines of this length that lies beyond a number, 0 to 1; of a line of no length either 0 or 1."""
+    """Fraction of lines of this length that lies beyond a number, 0 to 1; for a line without length, 0 or 1."""
     moves = length > 0.0
     return np.where(moves, np.clip(beyond / np.where(moves, length, 1.0), 0.0, 1.0), 1.0 * (beyond > 0.0))
 
@@ -197,7 +198,7 @@ def _part(beyond: np.ndarray, length: np.ndarray) -> np.ndarray:
 class OfExpression(OfPath):
     """The number that an expression such as "max(depth)" gives for each member's path, then a statistic of it.
 
-    The name of an estimate has the expression: "mean max(depth)".
+    The name of an estimate contains the expression: "mean max(depth)".
     """
 
     def meant(self) -> Quantity:
@@ -221,7 +222,7 @@ class OfExpression(OfPath):
 
 
 def followed(statistic: Statistic) -> Statistic:
-    """Return the statistic that is gathered for one: of paths, where it is of an expression that looks over them."""
+    """Return the statistic to gather: a statistic of paths, if the expression reduces paths; else the statistic itself."""
     if statistic.path is None:
         return statistic
     return OfExpression(statistic.path.label, then=replace(statistic, of=None), stopped=statistic.stopped)

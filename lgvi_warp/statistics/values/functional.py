@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Expressions for quantities: a name, a component of it, a difference, a length, and a reduction over the path.
+"""Expressions for quantities: a name, a component, a difference, a vector's length, or a reduction over the path.
 
-"position[2]" and "norm(velocity)" give numbers of each member at each time, as does the difference
-"measured_position - position"; "vehicle.buoyancy" gives the member's own; "max(depth)" and "range(norm(velocity))" give one
-number of each member, over its path.
-Statistics, sensitivity, trade-offs and stability maps all read them here.
+"position[2]", "norm(velocity)" and the difference "measured_position - position" give numbers of each member at each
+time; "vehicle.buoyancy" gives the member's own number; "max(depth)" and "range(norm(velocity))" give one number of each
+member, over its path. Statistics, sensitivity, trade-offs and stability maps all read expressions here.
 """
 
 from __future__ import annotations
@@ -37,7 +36,7 @@ INERTIAL = {"position", "velocity_inertial", "measured_position", "navigation_er
 
 @dataclass(frozen=True)
 class Functional:
-    """A quantity with the functions applied to it, and the index of the component taken of the result; None: all."""
+    """A quantity with the functions applied to it, and the index of the result's component; None: all components."""
 
     label: str
     quantity: Quantity
@@ -51,12 +50,12 @@ class Functional:
 
     @property
     def over_path(self) -> bool:
-        """Whether it reduces the path: one row for each member instead of one for each time."""
+        """True if it reduces the path: one row for each member instead of one for each time."""
         return self._turn is not None
 
     @property
     def inner(self) -> Quantity:
-        """The quantity at each time: all of it, or what is reduced over the path."""
+        """The quantity at each time, before any reduction over the path."""
         if not self.over_path:
             return self.as_quantity()
         functions = self.functions[: self._turn]
@@ -65,7 +64,7 @@ class Functional:
 
     @property
     def reduction(self) -> Reduction:
-        """The reduction of the path, with the functions and the entry that are taken of it."""
+        """The reduction of the path, with the functions and the entry that are applied to its result."""
         assert self._turn is not None
         reduction, functions = OVER_TIME[self.functions[self._turn]], self.functions[self._turn + 1 :]
         if not functions and self.entry is None:
@@ -78,7 +77,7 @@ class Functional:
         return replace(reduction, finish=finish, of_samples=reduction.of_samples and not functions)
 
     def _applied(self, functions: Sequence[str], values: np.ndarray) -> np.ndarray:
-        """The lengths that the functions name, and the entry, along the last axis."""
+        """Apply the functions (lengths of vectors) and take the entry, along the last axis."""
         for name in functions:
             values = np.sqrt(np.sum(values[..., LENGTHS[name]] ** 2, axis=-1, keepdims=True))
         return values if self.entry is None else values[..., self.entry : self.entry + 1]
@@ -111,14 +110,14 @@ class Functional:
         return self._applied(self.functions, values)
 
     def as_quantity(self) -> Quantity:
-        """Return the same as a Quantity; where it reduces the path, that has a name, and no number at each time."""
+        """Return the expression as a Quantity; if it reduces the path, this only has a name, and no numbers at each time."""
         if not self.functions and self.entry is None:
             return self.quantity
         return replace(self.quantity, name=self.label, labels=self.labels, function=self)
 
 
 def functional(key: str, of: Any) -> Functional:
-    """Return the expression that `of` gives."""
+    """Return the expression for `of`."""
     if isinstance(of, Functional):
         return of
     if not isinstance(of, str):
@@ -128,7 +127,7 @@ def functional(key: str, of: Any) -> Functional:
 
 
 def _parsed(key: str, of: str, text: str) -> Functional:
-    """The expression of a text without spaces, which is the whole of `of` or a part of it."""
+    """Parse a text without spaces, which is all of `of` or a part of it."""
     outer, entry = text, None
     if len(_operands(text)) == 1 and (match := re.fullmatch(r"(\w+\(.*\))\[(\d+)\]", text)):
         outer, entry = match[1], int(match[2])
@@ -160,12 +159,12 @@ def _parsed(key: str, of: str, text: str) -> Functional:
 
 
 def _inertial(meaning: Quantity) -> bool:
-    """Whether a quantity is a vector in inertial axes, whose first components are north and east, or a difference of such."""
+    """True if a quantity is a vector in inertial axes, beginning with north and east, or a difference of such vectors."""
     return meaning.size == 3 and not {part.partition("[")[0] for part in meaning.name.split(" - ")} - INERTIAL
 
 
 def _nested(text: str) -> tuple[list[str], str]:
-    """Names of the functions around a name, the outermost first; and the name."""
+    """Names of the functions around a name, the outermost first, and the name."""
     functions = []
     while len(_operands(text)) == 1 and (match := re.fullmatch(r"(\w+)\((.*)\)", text)):
         functions.append(match[1])
@@ -174,7 +173,7 @@ def _nested(text: str) -> tuple[list[str], str]:
 
 
 def _operands(text: str) -> list[str]:
-    """The parts of a text between the minus signs that are in no brackets."""
+    """The parts of a text between minus signs outside brackets."""
     parts, depth = [""], 0
     for character in text:
         depth += (character in "([") - (character in ")]")
@@ -186,7 +185,7 @@ def _operands(text: str) -> list[str]:
 
 
 def _difference(key: str, of: str, operands: Sequence[Functional]) -> Quantity:
-    """The first quantity less the others; of angles within half a turn."""
+    """The first quantity minus the others; differences of angles are wrapped to half a turn."""
     for operand in operands:
         if operand.over_path:
             remedy = "give a difference of quantities at each time, as in max(measured_depth - depth)"
@@ -211,7 +210,7 @@ def _difference(key: str, of: str, operands: Sequence[Functional]) -> Quantity:
 
 
 def quantity(key: str, of: Any) -> Quantity:
-    """Return the quantity of a name, a name with an index, a function of (samples, members), or a list of these as one."""
+    """Return the quantity for a name, a name with an index, a function of (samples, members), or a list of these."""
     if isinstance(of, Quantity):
         return of
     if isinstance(of, str):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Quantities of each member at each sample time: known by name, or functions of the samples."""
+"""Quantities of each member at each sample time: named quantities, or functions of the samples."""
 
 from __future__ import annotations
 
@@ -34,22 +34,22 @@ Function = Callable[["Fields", "Members"], np.ndarray]
 
 @dataclass(frozen=True)
 class Quantity:
-    """A function of a block's samples, for k sample times and n members.
+    """A quantity: a function of a block's samples, for k sample times and n members.
 
     A member whose number is not finite is left out at that time.
 
     Args:
         name: name in results and messages.
-        function: function(samples, members) that returns (k, n) numbers, or (k, n, d) for d components.
-            samples["position"] is (k, n, 3) and so on, samples.time (k,) [s], samples.terms and samples.events the
-            scene's; members are those that lw.Ensemble.select returns.
+        function: function(samples, members) that returns numbers (k, n), or (k, n, d) for d components.
+            samples["position"] is (k, n, 3) and so on, samples.time is (k,) [s], samples.terms and samples.events are
+            the scene's; members are as returned by lw.Ensemble.select.
         unit: unit of the numbers; by default "".
         fields: names of the samples that the function reads; by default all.
         labels: names of the d components; by default `name`, for one component.
-        needs_limit: whether a condition on it needs a number to compare with; by default False: the function may return
-            true or false.
-        entries: (field, indices) for each field of the motion of which the function reads these components alone, counted
-            from 0; at a controller's ticks the other components are NaN. By default none: it reads whole fields.
+        needs_limit: True if a condition on the quantity needs a limit; by default False: the function may return true
+            or false.
+        entries: (field, indices), counted from 0, for each field of the motion of which the function reads only these
+            components; at a controller's ticks the other components are NaN. By default none: it reads whole fields.
     """
 
     name: str
@@ -75,7 +75,7 @@ class Quantity:
     def __call__(self, samples: Fields, members: Members) -> np.ndarray:
         """Evaluate the quantity.
 
-        Returns: (k, d, n), contiguous; float32 where the function returns float32, else float64.
+        Returns: (k, d, n), contiguous; float32 if the function returns float32, else float64.
         """
         try:
             values = real_results(self.function(samples, members))
@@ -110,7 +110,7 @@ def _quaternion_wxyz(samples: Fields, members: Members) -> np.ndarray:
 
 
 def _euler(samples: Fields, members: Members) -> np.ndarray:
-    """(roll, pitch, yaw) of R = Rz(yaw) Ry(pitch) Rx(roll), Fossen's zyx convention."""
+    """Euler angles (roll, pitch, yaw) of R = Rz(yaw) Ry(pitch) Rx(roll), Fossen's zyx convention."""
     R = samples["attitude"].astype(np.float64, copy=False)
     pitch = -np.arcsin(np.clip(R[..., 2, 0], -1.0, 1.0))
     return np.stack([np.arctan2(R[..., 2, 1], R[..., 2, 2]), pitch, np.arctan2(R[..., 1, 0], R[..., 0, 0])], axis=-1)
@@ -161,7 +161,7 @@ KNOWN: dict[str, Quantity] = {
 
 @functools.cache
 def _of_signal(name: str) -> Quantity | None:
-    """A signal of a controller whose shape is the same in all scenes; None for what is no such signal."""
+    """A controller's signal whose shape is the same in all scenes; None if it is no such signal."""
     known = name not in CHANNELS and name in SIGNALS
     return _of(SIGNALS[name].field, (name,), _field(name)) if known else None
 
@@ -184,7 +184,7 @@ def named(key: str, of: str, text: str) -> Quantity:
 
 
 def _channel(key: str, of: str, name: str, index: str) -> Quantity:
-    """One channel of the actuators: only the scene knows how many there are."""
+    """One channel of the actuators; their number is known only from the scene."""
     if not re.fullmatch(r"\[\d+\]", index):
         raise refusal(key, of, f"is not one channel of {name}", f"give one: '{name}[0]'")
     i, label = int(index[1:-1]), name + index
@@ -200,7 +200,7 @@ def _channel(key: str, of: str, name: str, index: str) -> Quantity:
 
 
 def of_number(key: str, of: str, text: str) -> Quantity:
-    """One number of each member, the same at all times: only the scene knows which there are."""
+    """One number of each member, constant in time; which numbers exist is known only from the scene."""
     match = re.fullmatch(r"(.+?)(\[[\d,]+\])?", text)
     assert match is not None
     name, index = match[1], match[2] or ""
@@ -227,7 +227,7 @@ def of_number(key: str, of: str, text: str) -> Quantity:
 
 
 def unit_of_number(name: str) -> str:
-    """The unit of a number of the vehicle, the start, or a term or part without a name of its own; "" where none is known."""
+    """The unit of a number of the vehicle, the start, or a term or part without its own name; "" if it is unknown."""
     owner, _, word = name.rpartition(".")
     if owner == "start" and word in TABLE:
         return TABLE[word].unit
@@ -248,7 +248,7 @@ def component(base: Quantity, i: int) -> Quantity:
 
 
 def joined(parts: Sequence[Quantity]) -> Quantity:
-    """Return several quantities as one, with their components side by side."""
+    """Return several quantities as one, with concatenated components."""
     if len(parts) == 1:
         return parts[0]
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reductions of a path to one number, which take its samples one by one."""
+"""Reductions of a path to one number, which process its samples one by one."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ def _as_it_is(x: np.ndarray) -> np.ndarray:
 class Reduction:
     """Reduction of the samples of paths to one number for each path.
 
-    step: function (state, before, x, dt, share) that returns the state after another sample x. `before` is the sample before
-        it, dt the time [s] between the two, share that time divided by the time since the first sample.
+    step: function (state, before, x, dt, share) that returns the state after another sample x. `before` is the sample
+        before, dt the time [s] between the two, share this time divided by the time since the first sample.
     """
 
     step: Callable[[np.ndarray, np.ndarray, np.ndarray, float, float], np.ndarray]
@@ -36,7 +36,7 @@ class Reduction:
 
 
 def _towards(state: np.ndarray, before: np.ndarray, x: np.ndarray, dt: float, share: float) -> np.ndarray:
-    """Move the average so far towards the average since the sample before."""
+    """Move the average so far towards the average of the last interval."""
     return np.asarray(state + share * (0.5 * (before + x) - state))
 
 

@@ -13,13 +13,13 @@ from lgvi_warp.common.status import failed
 
 
 class Fields(dict[str, np.ndarray]):
-    """Samples of a block by the name of the field: arrays (k, n, ...) of k sample times and n members.
+    """Samples of a block by field name: arrays (k, n, ...) for k sample times and n members.
 
     fields: the arrays by name, such as "position" (k, n, 3) [m].
     time: (k,) [s], sample times.
-    steps: (k,), number of steps made before each sample time.
+    steps: (k,), number of steps before each sample time.
     ends: function that returns the status (n,) of the members, and the last step (n,) after which each was still running.
-    controller: the controller of the scene; None (the default) for none.
+    controller: the controller of the scene; None (the default) if there is none.
     events: the events of the scene; by default none.
     """
 
@@ -38,17 +38,17 @@ class Fields(dict[str, np.ndarray]):
         self.controller, self.events = controller, events
 
     def last(self) -> Fields:
-        """Return the samples at the last of these times."""
+        """Return the samples at the last sample time."""
         return self.at(np.array([len(self.time) - 1]))
 
     def at(self, places: np.ndarray) -> Fields:
-        """Return the samples at some of these times, by their indices (m,)."""
+        """Return the samples at some sample times, by their indices (m,)."""
         values = {name: values[places] for name, values in self.items()}
         others = self.time[places], self._steps[places], self.terms, self._when_ended, self.controller, self.events
         return type(self)(values, *others)
 
     def of_members(self, some: slice) -> Fields:
-        """Return the samples of some of the members, views."""
+        """Return the samples of some members, as views."""
         values = {name: values[:, some] for name, values in self.items()}
 
         def ends() -> tuple[np.ndarray, np.ndarray]:
@@ -64,12 +64,12 @@ class Fields(dict[str, np.ndarray]):
 
     @functools.cached_property
     def _ends(self) -> tuple[np.ndarray, np.ndarray] | None:
-        """Status (n,) of each member and the last step (n,) after which it still ran; None if all run on."""
+        """Status (n,) of each member and the last step (n,) after which it still ran; None if all are still running."""
         status, step = self._all_ends
         return (status, step) if np.any(status) else None
 
     def good(self, held: bool = True) -> np.ndarray | None:
-        """Return which members are valid at each time, (k, n); None if all are at all times."""
+        """Return the mask (k, n) of members that are valid at each time; None if all are valid at all times."""
         if self._ends is None:
             return None
         status, step = self._ends

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A quantity of a block's members at some sample times, with the intermediate results that several statistics share."""
+"""A quantity of a block's members at some sample times, with intermediate results that statistics share."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ class Values:
     replicates, each time has R rows, one for each replicate (see `dealt`), and n and `size` are per replicate.
 
     x: (k, d, n), the numbers.
-    good: (k, n), which members had not failed; None (the default) if none had.
-    weight: (n,), what each member weighs; None (the default): all the same. One of weight 0 does not count.
+    good: (k, n), True for members that had not failed; None (the default) if none had failed.
+    weight: (n,), weight of each member; None (the default): all the same. A member with weight 0 does not count.
 
     Attributes:
-        x: (k, d, n), float64; 0 where a member does not count.
-        good: (k, n), which members count; None if all do.
+        x: (k, d, n), float64; 0 if a member does not count.
+        good: (k, n), True for members that count; None if all do.
         count: (k,), number of members that count; under weights (see `under`) their sum.
-        single: whether the numbers came as float32, so that sorting them in float32 loses nothing.
+        single: True if the numbers were float32, so that sorting them in float32 loses nothing.
     """
 
     def __init__(
@@ -55,7 +55,7 @@ class Values:
             self.count = self.good.sum(axis=1)
 
     def under(self, power: int) -> Values:
-        """Return these values under a measure: sums weigh each member by a power of its weight, and `count` is their sum."""
+        """Return these values under a measure: sums use a power of each member's weight, and `count` is the sum of these."""
         assert self.weight is not None
         measure = np.broadcast_to(self.weight**power, (len(self.x), self.x.shape[2]))
         return self._under(measure if self.good is None else np.where(self.good, measure, 0.0))
@@ -69,7 +69,7 @@ class Values:
 
     @property
     def weights(self) -> np.ndarray:
-        """Weight of each member at each time, (k, n); 0 where it does not count."""
+        """Weight of each member at each time, (k, n); 0 if it does not count."""
         return np.ones((len(self.x), self.x.shape[2])) if self._measure is None else self._measure
 
     def with_numbers(self, x: np.ndarray) -> Values:
@@ -78,7 +78,7 @@ class Values:
         return other if self._measure is None else other._under(self._measure)
 
     def weighed(self, a: np.ndarray) -> np.ndarray:
-        """Return numbers a (k, d, n), times what each member weighs."""
+        """Return numbers a (k, d, n) times the members' weights."""
         return a if self._measure is None else a * self._measure[:, None]
 
     def summed(self, mask: np.ndarray) -> np.ndarray:
@@ -86,7 +86,7 @@ class Values:
         return np.asarray(mask.sum(axis=2) if self._measure is None else self.weighed(mask).sum(axis=2))
 
     def counted(self, places: np.ndarray, chosen: np.ndarray | None, length: int) -> np.ndarray:
-        """Return the sums (length,) over the members at each of the places (k, d, n), of those chosen (k, d, n), or of all."""
+        """Return the sums (length,) of members by their places (k, d, n), over the chosen members (k, d, n), or over all."""
         weights = None
         if self._measure is not None:
             weights = np.broadcast_to(self._measure[:, None], places.shape)
@@ -94,30 +94,30 @@ class Values:
         return np.bincount(places.ravel() if chosen is None else places[chosen], weights, length)
 
     def members(self, at: np.ndarray) -> np.ndarray:
-        """Return the indices in the run of members at places (k, d) along the last axis of `x`."""
+        """Return the indices in the run of the members at places (k, d) of the last axis of `x`."""
         return self.first + at * self.replicates + (np.arange(len(at)) % self.replicates)[:, None]
 
     def filled(self, value: float) -> np.ndarray:
-        """Return x (k, d, n) with a given number where a member does not count."""
+        """Return x (k, d, n) with a given number for members that do not count."""
         return self.x if self.good is None else np.where(self.good[:, None], self.x, value)
 
     @functools.cached_property
     def mean(self) -> np.ndarray:
-        """Mean over the members that count, (k, d); 0 where none counts."""
+        """Mean over the members that count, (k, d); 0 if none counts."""
         if self._measure is None:
             return self.x.sum(axis=2) / np.maximum(self.count, 1)[:, None]
         return self.weighed(self.x).sum(axis=2) / np.where(self.count > 0.0, self.count, 1.0)[:, None]
 
     @functools.cached_property
     def centred(self) -> np.ndarray:
-        """x less its mean, (k, d, n); 0 where a member does not count."""
+        """Difference of x from its mean, (k, d, n); 0 if a member does not count."""
         if self.good is None:
             return self.x - self.mean[:, :, None]
         return np.where(self.good[:, None], self.x - self.mean[:, :, None], 0.0)
 
 
 def dealt(x: np.ndarray, good: np.ndarray | None, first: int, block: int, size: int, replicates: int) -> Values:
-    """Return values with one row for each time and replicate; member i of n, a multiple of R, belongs to replicate i mod R."""
+    """Return values with one row for each time and replicate; of n members, a multiple of R, i is in replicate i mod R."""
     k, d, n = x.shape
     R = replicates
     rows = np.moveaxis(x.reshape(k, d, n // R, R), 3, 1).reshape(k * R, d, n // R)

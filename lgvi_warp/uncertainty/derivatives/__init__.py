@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Derivatives of what whole runs give, by differences of copies of members that run side by side."""
+"""Derivatives of the outputs of whole runs, by differences of copies of members that run side by side."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Answer of `derivatives`: derivatives with their errors, and numbers without one."""
+"""Answer of `derivatives`: derivatives with their errors, and the reasons if there is none."""
 
 from __future__ import annotations
 
@@ -22,23 +22,24 @@ ARRAYS = ("value", "jacobian", "error", "increments")
 class Derivatives(Saved):
     """Derivatives of a run's outputs with respect to numbers of its scene, made by `lw.derivatives`.
 
-    m is the number of quantities, k that of numbers. Of a fleet of n members every array has the members first: (n, m, k).
+    m is the number of quantities, k the number of numbers. For a fleet of n members every array has a first axis of
+    members: (n, m, k).
 
     Attributes:
         of: names of the quantities (m,).
-        units: their units (m,), "" where these are not known.
+        units: units of the quantities (m,), "" if unknown.
         by: names of the numbers (k,).
-        value: the quantities (m,).
-        jacobian: derivative of each quantity by each number (m, k) [unit of the quantity / unit of the number]; NaN for none.
-        error: estimate of the error of each derivative (m, k), from the disagreement of differences at several increments,
-            and from round-off. It is no bound: now and then an error is up to some 3 times that. It excludes the error of
-            the method's step. NaN where there is no derivative.
-        increments: the largest increment that each derivative uses (m, k) [unit of the number]; NaN where there is none.
-        undefined: "quantity by number" -> why it has no derivative, in a sentence.
+        value: values of the quantities (m,).
+        jacobian: derivative of each quantity by each number (m, k) [unit of quantity / unit of number]; NaN if undefined.
+        error: estimated error of each derivative (m, k), from the disagreement of differences at several increments,
+            and from round-off. It is not a bound: the true error is sometimes up to about 3 times as large. It excludes
+            the error of the method's step. NaN if there is no derivative.
+        increments: the largest increment that each derivative uses (m, k) [unit of the number]; NaN if undefined.
+        undefined: "quantity by number" -> sentence on the reason why it has no derivative.
         messages: notes for the user.
-        members: copies of members that were run.
+        members: number of copies of members that were run.
         provenance: scene, settings, versions and machine.
-        by_units: units of the numbers (k,), "1" for none.
+        by_units: units of the numbers (k,), "1" if there is none.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -133,12 +134,12 @@ class Derivatives(Saved):
 
 
 def _sure(value: float, error: float) -> str:
-    """A derivative with its error."""
+    """Text of a derivative with its error."""
     return "none" if math.isnan(value) else f"{value:.9g} +- {error:.1g}"
 
 
 def _ends(values: np.ndarray) -> str:
-    """The mean of members, with the least and the largest; how many have none."""
+    """Text of the members' mean, smallest and largest value, and of the number of members without a value."""
     known = values[np.isfinite(values)]
     count = len(values) - len(known)
     missing = f" ({count} members have none)" if count > 1 else " (1 member has none)" if count else ""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""From a question to the answer: copies are run, their differences extrapolated, and what has no derivative is named."""
+"""Answer a question: run copies, extrapolate their differences, and name quantities without a derivative."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ NUMBERS = ("jacobian", "error", "increments")
 class SlopesQuestion:
     """Question of the derivatives.
 
-    fleet: of which members. scene: of the copies. interests: what of them. names, targets: by which numbers. alone: of a
-    scene, so that answers have no axis of members. rounding: quantum of each sensor that rounds. smoothed: names of those
-    left out.
+    fleet: the members. scene: scene of the copies. interests: the quantities. names, targets: the numbers. alone: True
+    for a single scene; answers then have no axis of members. rounding: quantum of each sensor that rounds. smoothed:
+    names of quanta that are set to 0.
     """
 
     fleet: Ensemble
@@ -47,7 +47,7 @@ class SlopesQuestion:
     smoothed: tuple[str, ...] = ()
 
     def known_against(self, interest: OfResult, target: Target) -> str | None:
-        """Why a quantity has no derivative by a number, whatever the members do; None where nothing is known against it."""
+        """Reason why a quantity has no derivative by a number for any member; None if no reason is known."""
         return (
             undefined.of_number(self.scene, target)
             or undefined.of_interest(interest, target, self.scene)
@@ -56,7 +56,7 @@ class SlopesQuestion:
 
 
 class Answering:
-    """The answer as it is put together: arrays (n, m, k), and reasons by place (i, j) with the members that have them."""
+    """The answer under construction: arrays (n, m, k), and at (i, j) the reasons with the members that have them."""
 
     def __init__(self, question: SlopesQuestion, settings: Mapping[str, Any], report: Callable[[float], None]):
         self._question, self._settings, self._report = question, settings, report
@@ -71,7 +71,7 @@ class Answering:
         self._sides: dict[int, str] = {}
 
     def answer(self) -> Derivatives:
-        """Run the copies, and fill in what each group of members gave."""
+        """Run the copies, and fill in the results of each group of members."""
         question, runs = self._question, self._runs
         growth, from_here = runs.nudged(final=undefined.has_legs(question.scene))
         self._growth = growth if runs.dtype == "float64" else np.zeros_like(growth)
@@ -105,13 +105,13 @@ class Answering:
         )  # fmt: skip
 
     def _legs_of(self, at_end: np.ndarray) -> np.ndarray:
-        """Legs of waypoints that members have done (n, interests) where each quantity is asked; at_end: (n,)."""
+        """Legs of waypoints done (n, interests) at the time of each quantity; at_end: legs done at the end (n,)."""
         times = [each.when if isinstance(each, EndQuantity) else None for each in self._question.interests]
         at = {when: self._legs_at(when) for when in set(times) if when is not None and at_end.any()}
         return np.stack([at_end if when is None else at.get(when, at_end) for when in times], axis=1)
 
     def _legs_at(self, when: float) -> np.ndarray:
-        """Legs that members have done at a time (n,): of a run that ends there."""
+        """Legs that members have done at a time (n,), from a run that ends at this time."""
         if when <= 0.0:
             return np.zeros(self._question.fleet.members)
         interest = OfResult("position", lambda result: result.position[-1])
@@ -122,12 +122,12 @@ class Answering:
         return undefined.legs_done(self._question.scene, ended)
 
     def _same_steps(self) -> dict[str, Any]:
-        """Settings of runs with the same steps."""
+        """Settings of further runs with the same steps."""
         plan = self._runs.plan
         return {**self._settings, "method": plan.method, "h": plan.grid.h, "dtype": self._runs.dtype}
 
     def _groups(self) -> list[tuple[np.ndarray, Neighbours, Extrapolated]]:
-        """Run some members at all increments, and the others at those that were best."""
+        """Run some members at all increments, and the others at the best of these increments."""
         runs, n, k = self._runs, self._question.fleet.members, len(self._live)
         relative = np.broadcast_to(relative_increments(runs.dtype), (k, len(relative_increments(runs.dtype))))
         looked = np.arange(min(n, LOOKED_AT))
@@ -169,7 +169,7 @@ class Answering:
             array[members, i, j] = values
 
     def _fill(self, members: np.ndarray, near: Neighbours, slopes: Extrapolated) -> None:
-        """Take over derivatives of members, and look closely at those that may have none."""
+        """Store derivatives of members, and examine those that may be undefined."""
         times = self._stop_times(members, near)
         odd = (near.status != 0) | (self._growth[members] > undefined.MOST_GROWTH)
         odd = odd[:, None] | ~np.isfinite(near.at) | (self._legs[members][:, list(self._runs.owner)] > 0.0)
@@ -193,7 +193,7 @@ class Answering:
         self, member: int, place: tuple[int, int, int], near: Neighbours, slopes: Extrapolated,
         times: Mapping[tuple[int, int, int], SlopeOrReason],
     ) -> None:  # fmt: skip
-        """Note a derivative of a member, or why there is none."""
+        """Store a derivative of a member, or the reason why there is none."""
         row, i, j = place[0], place[1], self._live[place[2]]
         owner = self._runs.owner[i]
         slope: SlopeOrReason | None = undefined.of_member(
@@ -209,14 +209,14 @@ class Answering:
         self._arrays_at(member, i, j, slope)
 
     def _text(self, reasons: Mapping[str, list[int]], n: int) -> str:
-        """The reasons of members in one text."""
+        """Text of the members' reasons."""
         if self._question.alone:
             return next(iter(reasons))
         counted = [f"{text} ({len(which)} of {n} members, the first {which[0]})" for text, which in reasons.items()]
         return "; ".join(counted[:3])
 
     def _stop_times(self, members: np.ndarray, near: Neighbours) -> dict[tuple[int, int, int], SlopeOrReason]:
-        """Derivatives of the times at which events stopped members, by place (row, i, j)."""
+        """Derivatives of the times at which events stopped members: (row, i, j) -> derivative or reason."""
         runs, times = self._runs, dict[tuple[int, int, int], SlopeOrReason]()
         grid, events = runs.plan.grid, undefined.timed_events(self._question.scene)
         settings = self._same_steps()
@@ -244,7 +244,7 @@ class Answering:
 
 
 def _numbers(slopes: Extrapolated, place: tuple[int, int, int], increments: np.ndarray) -> SlopeOrReason:
-    """Derivative, error and increment, or why there is none; increments: (levels,)."""
+    """Derivative, error and increment, or the reason why there is none; increments: (levels,)."""
     reason = undefined.of_differences(slopes, place, increments)
     if reason is not None:
         return reason

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Copies of members with other numbers, that have the members' noise, and what runs of them give."""
+"""Copies of members with changed numbers and the members' noise, and the results of their runs."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ ABOVE, BELOW = 0, 1
 
 @dataclass(frozen=True, eq=False)
 class MovedCopies:
-    """Copies of the members of a fleet, of which some numbers are moved.
+    """Copies of the members of a fleet, with some numbers changed.
 
-    scene: of the copies, whose events and quanta may be others. targets: the numbers (k) that are moved. left_out: names of
-    numbers that the scene has in place of the members. unmovable: why numbers cannot be moved to either side, by their places.
+    scene: scene of the copies, whose events and quanta may differ. targets: the k numbers that are changed. left_out: names
+    of numbers taken from the scene instead of the members. unmovable: index of a number -> reason why it cannot be changed.
     """
 
     fleet: Ensemble
@@ -46,7 +46,7 @@ class MovedCopies:
 
     @functools.cached_property
     def numbers(self) -> dict[str, np.ndarray]:
-        """Numbers of the members' own, and the moved ones, whole: (n, ...) by name."""
+        """Arrays (n, ...) by name, of the members' own numbers and of the changed ones."""
         fleet, n = self.fleet, self.fleet.members
         parameters = fleet.parameters(0, n)
         known = {f"start.{name}": value[None] for name, value in fleet.scene.start.given().items()}
@@ -57,7 +57,7 @@ class MovedCopies:
 
     @functools.cached_property
     def at(self) -> np.ndarray:
-        """The members' numbers that are moved (n, k)."""
+        """The members' values of the numbers that are changed (n, k)."""
         return self._beside([self._entry(target, self.numbers[target.name]) for target in self.targets])
 
     def _beside(self, columns: Sequence[np.ndarray]) -> np.ndarray:
@@ -70,7 +70,7 @@ class MovedCopies:
 
     @functools.cached_property
     def sizes(self) -> np.ndarray:
-        """Scale of relative increments (n, k): the number, or the largest of its array; 1 where all are 0."""
+        """Scale of relative increments (n, k): the number, or the largest of its array; 1 if all are 0."""
         columns = []
         for j, target in enumerate(self.targets):
             values = self.numbers[target.name]
@@ -81,14 +81,14 @@ class MovedCopies:
         return self._beside(columns)
 
     def moved(self, each: np.ndarray, by: np.ndarray) -> dict[str, np.ndarray]:
-        """Numbers (N, ...) by name of copies of members each (N,), moved by (N, k)."""
+        """Numbers (N, ...) by name of copies of the members `each` (N,), changed by `by` (N, k)."""
         numbers = {name: np.array(values[each], dtype=np.float64) for name, values in self.numbers.items()}
         for j, target in enumerate(self.targets):
             variations.put(numbers, target, self.at[each, j] + by[:, j], into=True)
         return numbers
 
     def ensemble(self, each: np.ndarray, numbers: Mapping[str, np.ndarray]) -> Ensemble:
-        """Copies of members with these numbers. Raises SceneError: one is unphysical."""
+        """Copies of members with these numbers. Raises SceneError if one is unphysical."""
         of_scene = {name: values for name, values in numbers.items() if self._in_scene(name)}
         copies = Ensemble(
             self.scene, len(each), self.fleet.seed, None, Table(values=of_scene) if of_scene else "random"
@@ -104,9 +104,9 @@ class MovedCopies:
         return frozenset(self.scene.parameters())
 
     def physical(self, each: np.ndarray, increments: np.ndarray) -> np.ndarray:
-        """Mask of increments (n, k, levels), as (k, 2, levels) above and below, that leave all members each (n,) physical.
+        """Mask (k, 2, levels), above and below, of increments that leave all members `each` (n,) physical.
 
-        Why a number has none at all is noted in `unmovable`, by its place.
+        If a number has no such increment, `unmovable` gets the reason.
         """
         k, levels = increments.shape[1:]
         good = np.ones((k, 2, levels), bool)
@@ -124,7 +124,7 @@ class MovedCopies:
         return good
 
     def nudged(self) -> tuple[Ensemble, Ensemble]:
-        """The members as they start, and with starts that are a little beside."""
+        """The members with their own starts, and with slightly changed starts."""
         n = self.fleet.members
         every = np.arange(n)
         start = self.ensemble(every, self.numbers).select(0, n)
@@ -142,7 +142,7 @@ class MovedCopies:
 
 @dataclass(frozen=True)
 class CopyEnds:
-    """Ends of copies: values (N, m), NaN of those that failed, their status (N,) and the time of their end (N,) [s]."""
+    """Ends of copies: values (N, m), NaN for failed copies, status (N,) and end time (N,) [s]."""
 
     values: np.ndarray
     status: np.ndarray
@@ -150,15 +150,15 @@ class CopyEnds:
 
 
 class CopyRuns:
-    """Runs of copies, whose settings and kernel are settled once.
+    """Runs of copies, whose settings and kernel are prepared once.
 
-    interests: what is asked of them. settings: of `Runner`.
+    interests: the quantities. settings: arguments of `Runner`.
 
     Attributes:
-        labels, units: of the values (m,).
-        owner: (m,), place among the interests of each value.
-        provenance: of a run.
-        members: copies that were run.
+        labels, units: labels and units of the values (m,).
+        owner: (m,), index of the interest to which each value belongs.
+        provenance: provenance of a run.
+        members: number of copies that were run.
     """
 
     def __init__(self, copies: MovedCopies, interests: Sequence[OfResult], settings: Mapping[str, Any]):
@@ -185,7 +185,7 @@ class CopyRuns:
     def __call__(
         self, each: np.ndarray, by: np.ndarray, report: Callable[[float], None] | None = None
     ) -> tuple[CopyEnds, np.ndarray]:
-        """Ends of copies of members each (N,), moved by (N, k), and their displacements (N, k), rounding included."""
+        """Ends of copies of the members `each` (N,), changed by `by` (N, k), and the changes after rounding (N, k)."""
         parts, added = [], self.copies.at[each] + by - self.copies.at[each]
         for first in range(0, len(each), PATHS_AT_ONCE):
             rows = slice(first, first + PATHS_AT_ONCE)
@@ -211,9 +211,9 @@ class CopyRuns:
         return CopyEnds(values, status, np.asarray(result.end_time))
 
     def nudged(self, final: bool) -> tuple[np.ndarray, Result]:
-        """Growth factor of the distance between two starts up to the end (n,), and the run from the first ones.
+        """Growth factor of the distance between two starts up to the end (n,), and the run from the first starts.
 
-        final: whether its end is kept.
+        final: True if this run keeps its final state.
         """
         ends, results = [], []
         for group in self.copies.nudged():
@@ -226,7 +226,7 @@ class CopyRuns:
 
 
 def _with_states(save: SaveAt | None) -> SaveAt | None:
-    """Keep states beside signals alone: by them growth is told."""
+    """Add states to the saved fields if they are only signals: the growth is computed from states."""
     if not isinstance(save, SaveAt) or set(save.fields) & set(FIELDS):  # what is none is refused with the run
         return save
     return replace(save, fields=(*FIELDS, *save.fields))
@@ -234,9 +234,9 @@ def _with_states(save: SaveAt | None) -> SaveAt | None:
 
 @dataclass(frozen=True)
 class Neighbours:
-    """Values of members (n, m), and of copies with one number moved (n, m, k, levels), NaN where a copy does not count.
+    """Values of members (n, m), and of copies with one number changed (n, m, k, levels); NaN if a copy does not count.
 
-    increments: (n, k, levels), of which the next is a fourth. status, time: how and when the members ended (n,).
+    increments: (n, k, levels), each a fourth of the one before. status, time: status and end time of the members (n,).
     """
 
     at: np.ndarray
@@ -247,14 +247,14 @@ class Neighbours:
     time: np.ndarray
 
     def part(self, members: np.ndarray) -> Neighbours:
-        """Neighbours of some members."""
+        """The neighbours of some members."""
         return Neighbours(*(values[members] for values in vars(self).values()))
 
 
 def neighbours(
     runs: CopyRuns, members: np.ndarray, relative: np.ndarray, report: Callable[[float], None] | None = None
 ) -> Neighbours:
-    """Run members and copies of them in one call; relative: (k, levels), increments as parts of the numbers' sizes."""
+    """Run members and their copies in one call; relative: increments (k, levels), as fractions of numbers' sizes."""
     copies = runs.copies
     n, (k, levels) = len(members), relative.shape
     count = 1 + 2 * k * levels
@@ -281,9 +281,9 @@ def neighbours(
 
 
 def _moves(increments: np.ndarray, good: np.ndarray) -> np.ndarray:
-    """Displacements of copies (n (1 + 2 k levels), k): a member itself, then copies above and below of each increment.
+    """Changes of copies (n (1 + 2 k levels), k): the member itself, then copies above and below for each increment.
 
-    increments: (n, k, levels). good: (k, 2, levels), those that are not good stay where they are.
+    increments: (n, k, levels). good: (k, 2, levels), False for increments that are replaced by 0.
     """
     n, k, levels = increments.shape
     moved = np.zeros((n, k, levels, 2, k))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`derivatives`: how what a run gives changes with the numbers of its scene."""
+"""`derivatives`: derivatives of a run's outputs with respect to numbers of its scene."""
 
 from __future__ import annotations
 
@@ -44,35 +44,34 @@ def derivatives(
 ) -> Derivatives:
     """Compute derivatives of a run's outputs with respect to numbers of the scene, each with an error estimate.
 
-    Copies of a member, moved by many increments to both sides, run with it in one call, with the same noise. Their
-    differences are extrapolated, and the increments that agree best are used. A quantity that changes in steps, or jumps,
-    has no derivative: it is named with the reason, and its entries are NaN.
+    Copies of a member, with numbers changed by many increments to both sides, run with the member in one call, with the
+    same noise. Their differences are extrapolated, and the increments that agree best are used. A quantity that changes
+    in steps, or jumps, has no derivative: the answer gives the reason, and the entries are NaN.
 
     Args:
         fleet: A Scene, whose [ensemble] is ignored; or an Ensemble, each member of which has its own derivatives.
         of: One or several quantities, as in `lw.prepare`: "position[2]", "max(depth)", "end_time floor",
             lw.metrics.ITAE("depth"), a function of a Result.
         by: Names of the numbers, as in `lw.prepare`: "vehicle.mass", "start.position[2]", "depth_pid.kp", ...
-        method: As in `lw.solve`, as all settings that follow: what is left out is that of the scene.
+        method: As in `lw.solve`, like all following settings; the scene's values are the defaults.
         h: Step [s].
         t1: End of the run [s].
         save: Samples to keep; default those that the quantities need.
         dtype: "float64", "float32" or "float32_compensated". In float32 derivatives have few digits.
-        smooth: Whether sensors' readings are not rounded to their quantum. Default False.
-        seed: Seed of the noise, and of the members of a fleet that is drawn, a whole number from 0; default that of the
-            ensemble.
+        smooth: True turns off the rounding of sensor readings to their quantum. Default False.
+        seed: Seed of the noise, and of the members if they are drawn, a whole number from 0; default the ensemble's seed.
         threads: Number of threads; default all cores, one for short runs.
         width: Vehicles per packet; default from the CPU.
         executor: "threads" (default), "processes" or "dask", or an object that runs blocks.
         scheduler: Address of Dask's scheduler.
-        progress: True shows a bar or lines, as in lw.solve; a function is called with the fraction of the work that is done,
-            in [0, 1]. None, the default: nothing is shown.
+        progress: True shows a bar or lines, as in lw.solve; a function is called with the completed fraction of the
+            work, in [0, 1]. None, the default: nothing is shown.
 
     Returns:
-        Values, derivatives with their errors, and what has none.
+        Values, derivatives with their errors, and the reasons for undefined derivatives.
 
     Raises:
-        SceneError: For faulty arguments, all in one message.
+        SceneError: If arguments are faulty; one message lists all.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -90,7 +89,7 @@ def derivatives(
 
 
 def _checked(fleet: Any, of: Any, by: Any, smooth: Any, seed: Any) -> SlopesQuestion:
-    """The question. Raises SceneError, with all faults of the arguments."""
+    """Read the question. Raises SceneError with all faults of the arguments."""
     scene, faults = scene_of(fleet), Faults()
     interests: tuple[OfResult, ...] = ()
     with faults.including():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""From differences at many increments to a derivative with its error, or to why there is none."""
+"""Extrapolate differences at many increments to a derivative with its error, or find why there is none."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ FINE, FEW, ROUGH, STEPS, KINK = range(5)
 
 @dataclass(frozen=True)
 class Extrapolated:
-    """Derivatives, all arrays of one shape.
+    """Derivatives; all arrays have one shape.
 
-    value, error: of the derivative. first: place of the largest increment that it stands on. jump: the derivative from above
-    less that from below. rounding: error of a value, by the scatter at the least increments. code: FINE; FEW increments
-    without failed copies; ROUGH: they disagree; STEPS: a jump between two of them; KINK: the two sides differ.
+    value, error: the derivative and its error. first: index of the largest increment used. jump: derivative from above
+    minus derivative from below. rounding: error of a value, by the scatter at the smallest increments. code: FINE; FEW:
+    few increments without failed copies; ROUGH: increments disagree; STEPS: a jump between two; KINK: the sides differ.
     """
 
     value: np.ndarray
@@ -43,12 +43,12 @@ class Extrapolated:
     code: np.ndarray
 
     def part(self, members: np.ndarray) -> Extrapolated:
-        """Values of some members, where the first axis is that of members."""
+        """Values of some members; the first axis must be the members."""
         return Extrapolated(*(values[members] for values in vars(self).values()))
 
 
 def relative_increments(dtype: str) -> np.ndarray:
-    """Increments as parts of a number's size, the largest first."""
+    """Increments as fractions of a number's size, the largest first."""
     return np.asarray(LARGEST * RATIO ** -np.arange(LEVELS[dtype]))
 
 
@@ -62,8 +62,8 @@ def extrapolated(
 ) -> Extrapolated:
     """Derivatives from values at x (...), and above and below it by the increments (..., levels).
 
-    above, below: NaN where a copy failed, or may not be. One of them is NaN throughout for differences to one side.
-    eps: round-off of the run. rounding: error of a value (...), where it is known.
+    above, below: NaN if a copy failed or is not allowed. For one-sided differences one of them is all NaN.
+    eps: round-off of the run. rounding: error of a value (...), if known.
     """
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         return _extrapolated(at, above, below, increments, eps, rounding)
@@ -111,7 +111,7 @@ def _extrapolated(
 
 
 def scatter(slopes: np.ndarray, increments: np.ndarray) -> np.ndarray:
-    """Error of a value that the scatter of slopes at the last increments tells, beside which these are short."""
+    """Error of a value, from the scatter of slopes at the smallest increments."""
     seen = np.abs(np.diff(slopes, axis=-1)) * increments[..., 1:]
     count = np.isfinite(seen).sum(axis=-1, keepdims=True)
     place = np.cumsum(np.isfinite(seen), axis=-1)
@@ -119,9 +119,9 @@ def scatter(slopes: np.ndarray, increments: np.ndarray) -> np.ndarray:
 
 
 def _windows(slopes: np.ndarray, sides: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Richardson's extrapolation from each three increments in a row, and how far those of two are apart.
+    """Richardson extrapolations from three successive increments each, and differences of those from two.
 
-    sides: (..., 1): 1 where the error has even powers of the increment alone, else 0.
+    sides: (..., 1): 1 if the error has only even powers of the increment, else 0.
     """
     low, high = (
         np.where(sides > 0, RATIO**even, RATIO**any_power) for even, any_power in zip(BOTH_SIDES, ONE_SIDE, strict=True)
@@ -132,7 +132,7 @@ def _windows(slopes: np.ndarray, sides: np.ndarray) -> tuple[np.ndarray, np.ndar
 
 
 def _beyond_finer(value: np.ndarray, noise: np.ndarray) -> np.ndarray:
-    """Difference of each derivative from those of finer increments, less round-off."""
+    """Largest difference of each derivative from those of smaller increments, minus round-off."""
     beyond = np.zeros_like(value)
     for i in range(value.shape[-1] - 1):
         apart = np.abs(value[..., i : i + 1] - value[..., i + 1 :]) - 4.0 * noise[..., i + 1 :]
@@ -141,16 +141,16 @@ def _beyond_finer(value: np.ndarray, noise: np.ndarray) -> np.ndarray:
 
 
 def _jump(gaps: np.ndarray, noise: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Limit of the gap between slopes to both sides as the increment goes to 0, and its uncertainty."""
+    """Limit, for increments to 0, of the difference between the slopes on both sides, and its uncertainty."""
     once = gaps[..., 1:] + np.diff(gaps, axis=-1) / (RATIO - 1.0)
     twice = once[..., 1:] + np.diff(once, axis=-1) / (RATIO**3 - 1.0)
     return twice, np.abs(np.diff(once, axis=-1)) + 8.0 * noise[..., 2:]
 
 
 def _abrupt(left: np.ndarray, least: np.ndarray) -> np.ndarray:
-    """Whether what a slope leaves of changes (..., levels) stays a while, and vanishes from one increment to the next.
+    """True if residuals (..., levels) of a slope stay large, then vanish from one increment to the next.
 
-    least: (..., levels), below which it is of no account.
+    least: (..., levels), residuals below this do not count.
     """
     before, here, after = left[..., :-2], left[..., 1:-1], left[..., 2:]
     vanishes = (here > ABRUPT * after) & (here > np.maximum(least, np.finfo(float).tiny)[..., 1:-1])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The time at which an event stops members, as a smooth number: the root of the distance of a run that goes on."""
+"""Smooth stop times of an event: roots of the event's distance, from a run that continues."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ NODES, CORRECTIONS = (-1, 0, 1, 2), 8
 
 
 class StopTimeRuns(CopyRuns):
-    """Runs of copies without events, whose values are the time at which a distance is used up: by cubic, by parabola.
+    """Runs of copies without events; values: times at which the event's distance reaches 0, by a cubic and a parabola.
 
-    event: of which. step: the last whole step before it stopped the members. settings: with method, step size and precision.
+    event: the event. step: the last whole step before it stopped the members. settings: include method, step and precision.
     """
 
     def __init__(self, copies: MovedCopies, event: Any, step: int, settings: Mapping[str, Any]):
@@ -54,7 +54,7 @@ class StopTimeRuns(CopyRuns):
 
 
 def _root(distances: np.ndarray, degree: int) -> np.ndarray:
-    """Root of the polynomial through samples (4, N) at 0, 1, 2, 3 (N,); NaN where that is far from them."""
+    """Root (N,) of the polynomial through samples (4, N) at 0, 1, 2, 3; NaN if it is far from the samples."""
     places = np.arange(degree + 1.0)
     to_powers = np.linalg.inv(np.vander(places, increasing=True))
     powers = to_powers @ distances[: degree + 1]

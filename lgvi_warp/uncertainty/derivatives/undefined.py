@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Numbers of a scene without derivative, whatever differences say: steps, jumps by a tick, lost memory."""
+"""Reasons against a derivative that differences do not show: steps, jumps by a tick, growth of small differences."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ BEFORE = 'ask for a quantity at a time before, "depth at 30", or for when it end
 
 
 def of_number(scene: Any, target: Target) -> str | None:
-    """Why nothing has a derivative by a number of a scene; None where nothing is known against it."""
+    """Reason why no quantity has a derivative by this number of a scene; None if no reason is known."""
     key, _, name = target.name.rpartition(".")
     part = next((part for part in scene.parts if part.key == key), None)
     reason = None
@@ -72,7 +72,7 @@ def of_number(scene: Any, target: Target) -> str | None:
 
 
 def of_interest(interest: OfResult, number: Target, scene: Any) -> str | None:
-    """Why a quantity has no derivative, by a number or by any; None where nothing is known against it."""
+    """Reason why a quantity has no derivative, by this number or by any; None if no reason is known."""
     key, _, name = number.name.rpartition(".")
     events = {event.key: event for event in scene.events}
     timed = isinstance(events.get(key), StopTime) and name == "at"
@@ -90,24 +90,24 @@ def of_interest(interest: OfResult, number: Target, scene: Any) -> str | None:
 
 
 def is_end_time(interest: OfResult) -> TypeGuard[EndQuantity]:
-    """Whether a quantity is the time at which members ended in some way."""
+    """True if a quantity is the time at which members ended with some outcome."""
     return isinstance(interest, EndQuantity) and interest.kind == "end_time"
 
 
 def timed_events(scene: Any) -> dict[str, Any]:
-    """Events by name whose distance is known, so that the time at which they stop members has a derivative."""
+    """Events by name whose distance is known, so that their stop times have a derivative."""
     return {event.key: event for event in scene.events if event.type in COUNTS}
 
 
 def quanta(scene: Any, numbers: Mapping[str, np.ndarray]) -> dict[str, float]:
-    """The largest quantum by the name of each sensor's that rounds; numbers: what members have of their own."""
+    """The largest quantum of each sensor that rounds, by name; numbers: the members' own values."""
     names = {f"{part.key}.quantum": part for part in scene.parts if isinstance(part, Sensor)}
     largest = {name: float(np.max(np.abs(numbers.get(name, part.quantum)))) for name, part in names.items()}
     return {name: quantum for name, quantum in largest.items() if quantum > 0.0}
 
 
 def of_loop(rounding: Mapping[str, float]) -> str | None:
-    """Why nothing of a loop has a derivative whose sensors round."""
+    """Reason why nothing has a derivative in a loop whose sensors round."""
     if not rounding:
         return None
     sensors = ", ".join(f"{name.rpartition('.')[0]} to {quantum:g}" for name, quantum in rounding.items())
@@ -119,12 +119,12 @@ COUNTING: Mapping[type, int] = {Waypoints: 0, Docking: 2}
 
 
 def has_legs(scene: Any) -> bool:
-    """Whether something guides along one leg after another."""
+    """True if some guidance follows one leg after another."""
     return any(type(part) in COUNTING for part in scene.parts)
 
 
 def legs_done(scene: Any, result: Result) -> np.ndarray:
-    """Number of legs of waypoints, or ways to a dock, that members have done at the end of a run (n,), 0 without any."""
+    """Number of legs of waypoints, or approaches to a dock, done at the end of a run (n,); 0 if there are none."""
     done = np.zeros(result.members)
     for part in (part for part in scene.parts if type(part) in COUNTING):
         remembered = result.final.lanes[f"{MEMORY}part {part.key} {type(part).__name__}"]
@@ -133,10 +133,10 @@ def legs_done(scene: Any, result: Result) -> np.ndarray:
 
 
 def of_member(interest: OfResult, value: float, code: int, end: float, growth: float, legs: float) -> str | None:
-    """Why a quantity of a member has no derivative; None where nothing is known against it.
+    """Reason why a quantity of a member has no derivative; None if no reason is known.
 
-    code: its status. end: when it ended [s]. growth: of small differences of its start. legs: of waypoints that it has done
-    when the quantity is asked.
+    code: the member's status. end: its end time [s]. growth: growth factor of small differences of its start. legs:
+    number of legs of waypoints that it has done at the time of the quantity.
     """
     if failed(np.array([code]))[0]:
         return f"the member failed ({Status(code).name.lower()})"
@@ -154,7 +154,7 @@ def of_member(interest: OfResult, value: float, code: int, end: float, growth: f
 
 
 def of_differences(slopes: Extrapolated, place: tuple[int, ...], increments: np.ndarray) -> str | None:
-    """Why differences give no derivative; None where they do. increments: (levels,)."""
+    """Reason why differences give no derivative; None if they do. increments: (levels,)."""
     code, largest, least = int(slopes.code[place]), increments.max(), increments.min()
     if code == FEW:
         return f"copies at increments from {least:.2g} to {largest:.2g} fail, or end in another way"

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One statistic at the error asked for, for the least work."""
+"""Estimate one statistic to a requested error at the lowest cost."""

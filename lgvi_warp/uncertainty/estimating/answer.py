@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The answer to what a statistic is, with its error and what it took."""
+"""Answer of `estimate`: a statistic with its error and its cost."""
 
 from __future__ import annotations
 
@@ -22,24 +22,24 @@ class Estimated(Summarized, Saved):
         of: name of the statistic.
         unit: unit of the value and of all errors.
         value: the estimate [`unit`].
-        interval: its 95 % interval, of sampling and bias together, (low, high) [`unit`].
+        interval: 95 % interval for sampling error and bias together, (low, high) [`unit`].
         error: requested root mean square error [`unit`].
         sampling_error: standard error of sampling [`unit`].
-        bias: estimated bias: difference from a finer setting; it is not subtracted from the value [`unit`].
-        bias_interval: its 95 % interval, with the remaining bias of that setting, (low, high) [`unit`].
-        setting: the setting whose statistic is estimated, as "psi_x 0.025".
-        settings: the same as arguments of `lw.solve`: method, h and dtype.
-        reference: the finer setting of the estimated bias, and the number of members.
+        bias: estimated bias, the difference from a finer setting; it is not subtracted from the value [`unit`].
+        bias_interval: 95 % interval of the bias, including the finer setting's remaining bias, (low, high) [`unit`].
+        setting: the setting whose statistic is estimated, such as "psi_x 0.025".
+        settings: this setting as arguments of `lw.solve`: method, h and dtype.
+        reference: text with the finer setting of the bias estimate, and its number of members.
         estimator: "plain Monte Carlo", "sobol", "regression", "levels" or "levels of sobol".
-        members: number of members of the run by setting, "psi_x 0.025 less psi_x 0.2" for pairs.
-        seconds: processor time of all, pilot included, without compiling [s].
-        pilot_seconds: that of the pilot [s].
-        plain_seconds: predicted processor time of plain Monte Carlo in the same setting, to the same error [s].
-        own_seconds: the same at the scene's own step; None where it has none.
-        rivals: estimator -> how many times less than plain Monte Carlo it was predicted to cost, in that setting.
+        members: setting -> number of members that were run; pairs of settings are named "psi_x 0.025 less psi_x 0.2".
+        seconds: processor time of all runs, including the pilot, without compiling [s].
+        pilot_seconds: processor time of the pilot [s].
+        plain_seconds: predicted processor time of plain Monte Carlo in this setting, to the same error [s].
+        own_seconds: the same prediction at the scene's own step; None if the scene has no step.
+        rivals: estimator -> predicted cost of plain Monte Carlo in this setting, divided by the estimator's.
         messages: notes for the user.
-        recipe: what it takes to run the same members again, to the bit, as lw.estimate(fleet, of, recipe=found.recipe): seed,
-            setting, estimator, and by level settings, slopes, strata and members.
+        recipe: data to run the same members again, bit-identically, by lw.estimate(fleet, of, recipe=found.recipe):
+            seed, setting, estimator, and for each level settings, slopes, strata and members.
         provenance: scene, ensemble, settings, versions and machine.
     """
 
@@ -85,7 +85,7 @@ class Estimated(Summarized, Saved):
         return f"{self.of} is {self._value()}; root-mean-square error {reached}{asked}."
 
     def _value(self) -> str:
-        """The estimate with its interval."""
+        """Text of the estimate with its interval."""
         low, high = self.interval
         digits = _digits(self.value, 0.5 * (high - low))
         text = few_digits(self.value, self.unit, digits)

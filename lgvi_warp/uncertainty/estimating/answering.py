@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""From a pilot to the answer: the setting, the estimator, the run with numbers fixed beforehand, and what is told of it."""
+"""From a pilot to the answer: choose the setting and the estimator, run with fixed numbers of members, and report."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def answered(
     pilot: Pilot, ladders: Sequence[Sequence[Setting]], coarse: Sequence[Sequence[Setting]], fixed: bool,
     own: Setting | None, report: Callable[[float], None], content: Mapping[str, Any],
 ) -> Estimated:  # fmt: skip
-    """Run the pilot, choose, run, and tell."""
+    """Run the pilot, choose setting and estimator, run the members, and return the answer."""
     chosen = setting_of(pilot, ladders, fixed, own)
     report(0.1)
     if constant(pilot, chosen.setting):
@@ -71,7 +71,7 @@ def answered(
 def tried(
     pilot: Pilot, seen: Observed, chosen: Chosen, report: Callable[[float], None]
 ) -> tuple[list[Level], list[Way], Setting | None]:
-    """Run the best way that does not stand on a setting at which members fail; the top setting where they fail at it."""
+    """Run the best way without settings at which members fail; also returns the top setting if members fail at it."""
     while True:
         ways = candidates(seen, chosen.variance, pilot.estimator)
         if pilot.estimator not in (None, ways[0].name):
@@ -88,7 +88,7 @@ def tried(
 
 
 def looked(pilot: Pilot, chosen: Chosen, coarser: Sequence[Setting]) -> Observed:
-    """Common part of the settings, from as many members as are worth their cost."""
+    """Observe how closely the settings agree, with as many members as are worth their cost."""
     top, variance, only = chosen.setting, chosen.variance, pilot.estimator
     few = only is None and pilot.plain_members(top, pilot.first, unseen=True) <= FEW
     seen = observed(pilot, top, [] if few else in_single(pilot, top, coarser), pilot.first)
@@ -108,7 +108,7 @@ def looked(pilot: Pilot, chosen: Chosen, coarser: Sequence[Setting]) -> Observed
 
 
 def in_single(pilot: Pilot, top: Setting, coarser: Sequence[Setting]) -> list[Setting]:
-    """Coarse settings in single precision, where plain Monte Carlo costs so much that another kernel pays."""
+    """Coarse settings, in single precision if plain Monte Carlo costs so much that another kernel pays."""
     plain_seconds = pilot.plain_members(top, pilot.first) * pilot.runs.cost(top, pilot.grid(top))
     if not pilot.single or plain_seconds < WORTH_A_KERNEL:
         return list(coarser)
@@ -124,7 +124,7 @@ def in_single(pilot: Pilot, top: Setting, coarser: Sequence[Setting]) -> list[Se
 
 
 def with_coarsest(pilot: Pilot, seen: Observed, variance: float) -> Observed:
-    """The same with more members of the best way's coarsest setting, which cost little and most are run of."""
+    """The observations with more members of the best way's coarsest setting, which is cheap and runs most members."""
     best = candidates(seen, variance, pilot.estimator)[0]
     last = best.chain[-1]
     worth = [n for n in LOOKS if n * seen.costs[last] <= SHARE * best.seconds and n > len(seen.z[last])]
@@ -139,14 +139,14 @@ def with_coarsest(pilot: Pilot, seen: Observed, variance: float) -> Observed:
 
 
 def worth_more(seen: Observed, variance: float, only: str | None = None) -> list[Setting]:
-    """The coarser settings of ways that cost at most twice the least."""
+    """The coarser settings of ways that cost at most twice as much as the cheapest way."""
     ways = candidates(seen, variance, only)
     near = {i for way in ways if way.seconds <= 2.0 * ways[0].seconds for i in way.chain}
     return [seen.settings[i] for i in sorted(near - {0})]
 
 
 def without(seen: Observed, failed: Setting) -> Observed:
-    """The same without a setting."""
+    """The observations without one setting."""
     kept = [i for i, setting in enumerate(seen.settings) if setting != failed]
 
     def chosen(values: Sequence[Any]) -> list[Any]:
@@ -158,7 +158,7 @@ def without(seen: Observed, failed: Setting) -> Observed:
 
 
 def levels_of(pilot: Pilot, seen: Observed, way: Way) -> list[Level]:
-    """The levels of a way, each with points and noise of its own."""
+    """The levels of a way, each with its own points and noise."""
     levels, weight = list[Level](), seen.weight
     for i, (place, members) in enumerate(zip(way.chain, way.members, strict=True)):
         if members > MOST:
@@ -186,7 +186,7 @@ def levels_of(pilot: Pilot, seen: Observed, way: Way) -> list[Level]:
 
 
 def run(runs: Runs, levels: Sequence[Level], report: Callable[[float], None]) -> Setting | None:
-    """Run the levels' members; the setting of which some failed, None for none."""
+    """Run the levels' members; returns the setting at which some failed, or None."""
     for i, level in enumerate(levels):
         level.grow(runs, level.members)
         if (failed := level.failed()) is not None:
@@ -200,9 +200,9 @@ Round = tuple[float, list[int]]
 
 
 def enough(pilot: Pilot, chosen: Chosen, levels: Sequence[Level]) -> tuple[list[Round], MeanEstimate]:
-    """The estimate; where its error is beyond the one asked for, with what it takes, up to four times the members, twice.
+    """The estimate; if its error exceeds the requested one, members are added, at most twice and to four times.
 
-    Levels grow that have most of the variance.
+    The levels with most of the variance grow.
     """
     target, runs, kind = pilot.target, pilot.runs, levels[0].kind
     pilot.check_tail(chosen.setting, np.concatenate(levels[0].y))
@@ -226,10 +226,10 @@ def enough(pilot: Pilot, chosen: Chosen, levels: Sequence[Level]) -> tuple[list[
 def grown(
     runs: Runs, target: Sought, levels: Sequence[Level], more: Round, before: MeanEstimate | None
 ) -> tuple[Solved, MeanEstimate]:
-    """Add a round of members, and estimate anew.
+    """Add a round of members, and estimate again.
 
-    The variance is then at least what the one before lets expect of so many members, over as much again: a stop by chance
-    must not tell too small an error.
+    The new variance is at least the variance before, divided by the squared growth in members, since stopping at a
+    variance that is small by chance must not make the error too small.
     """
     share, counts = more
     for level, count in zip(levels, counts, strict=True):
@@ -243,7 +243,7 @@ def grown(
 
 
 def one_run(runs: Runs, setting: Setting, grid: float | None) -> MeanEstimate:
-    """The number that all members have where nothing varies."""
+    """The number that all members share if nothing varies."""
     y = runs(setting, grid, design(runs.seed, "estimate pilot", runs.dimensions, 0, 1), np.arange(1))
     return MeanEstimate(float(y[0]), 0.0, math.inf)
 
@@ -252,7 +252,7 @@ def told(
     pilot: Pilot, chosen: Chosen, levels: Sequence[Level], rounds: Sequence[Round],
     found: tuple[Sequence[Way], float] | None, part: MeanEstimate, own: Setting | None, content: Mapping[str, Any],
 ) -> Estimated:  # fmt: skip
-    """The answer in full."""
+    """Assemble the complete answer."""
     top, runs = chosen.setting, pilot.runs
     messages = list(pilot.messages)
     ways, pilot_seconds = found or ((), 0.0)
@@ -279,7 +279,7 @@ def told(
 
 
 def replayed(runs: Runs, target: Sought, recipe: Mapping[str, Any], content: Mapping[str, Any]) -> Estimated:
-    """The answer of a recipe: the same members of the same levels, without a pilot."""
+    """The answer from a recipe: the same members of the same levels, without a pilot."""
     levels = [Level.from_dict(each) for each in recipe["levels"]]
     part = None if levels else one_run(runs, Setting.from_dict(recipe["setting"]), recipe["grid"])
     for share, counts in recipe["rounds"]:
@@ -293,7 +293,7 @@ def answer_of(
     runs: Runs, target: Sought, recipe: Mapping[str, Any], levels: Sequence[Level], part: MeanEstimate,
     content: Mapping[str, Any], messages: tuple[str, ...] = (), **more: Any,
 ) -> Estimated:  # fmt: skip
-    """The answer by a recipe and the members that were run by it."""
+    """Assemble the answer from a recipe and the members that were run."""
     top, bias = Setting.from_dict(recipe["setting"]), Bias(*recipe["bias"])
     members: dict[str, int] = {}
     for level in levels:
@@ -322,9 +322,9 @@ def answer_of(
 def between_members(
     target: Sought, levels: Sequence[Level], part: MeanEstimate, low: float, high: float, bias: Bias
 ) -> tuple[float, float]:
-    """The interval of a quantile that few members are beyond: between the quantiles at the ends of its level's interval.
+    """The interval of a quantile with few members beyond it: the quantiles at the ends of its level's interval.
 
-    As `lw.statistics.Quantiles` has it. Without an end where less than one member is beyond.
+    It agrees with `lw.statistics.Quantiles`. An end is infinite if less than one member lies beyond it.
     """
     samples = samples_of(levels)
     level, at = target.level, target.solved(samples)
@@ -344,7 +344,7 @@ def between_members(
 
 
 def within(part: MeanEstimate, low: float, high: float, bias: Bias, members: int) -> tuple[float, float]:
-    """The interval of a probability: Wilson's, with as many members as have the variance, in [0, 1]."""
+    """Wilson's interval of a probability, for the number of independent members with this variance."""
     p = float(np.clip(part.value, 0.0, 1.0))
     from scipy.special import stdtrit
 

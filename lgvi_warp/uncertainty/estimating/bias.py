@@ -24,8 +24,8 @@ ALIKE = 2.0
 class StepChange:
     """Change of a statistic from a coarse setting to a fine one, both on the same members and noise.
 
-    value: coarse less fine. half: of its 95 % interval. left: 1 - rho^2. members: number of pairs.
-    alike: whether both spread about as much, as members that are apart by chaos do, and steps that are too long do not.
+    value: coarse minus fine. half: half width of its 95 % interval. left: 1 - rho^2. members: number of pairs.
+    alike: True if both have similar spreads, as with chaos; if a step is too long, they differ.
     """
 
     value: float
@@ -36,12 +36,12 @@ class StepChange:
 
     @property
     def largest(self) -> float:
-        """The farther end of the interval from 0."""
+        """Largest absolute value in the interval."""
         return abs(self.value) + self.half
 
     @property
     def apart(self) -> bool:
-        """Whether members of both settings have little in common, and no step is too long."""
+        """True if members of both settings are nearly uncorrelated, but no step is too long."""
         return self.alike and self.left > APART
 
 
@@ -59,9 +59,9 @@ class Bias:
 
 
 def difference(coarse: np.ndarray, fine: np.ndarray, least: float = 0.0) -> StepChange:
-    """The paired difference of two settings' contributions (n,), of replicates where these are enough.
+    """The paired difference of two settings' contributions (n,), by replicates if there are enough.
 
-    least: as in `estimators.plain`; where none of n members differs, up to 3 / n of them may, with 95 %.
+    least: as in `estimators.plain`; if none of n members differs, up to 3 / n of all may, at 95 % confidence.
     """
     with np.errstate(over="ignore", invalid="ignore"):  # numbers of steps that are too long may be huge
         apart, n = coarse - fine, len(coarse)
@@ -79,8 +79,8 @@ def beyond(halvings: Sequence[StepChange], order: int = 1) -> float:
 
     docs/theory/estimators.md, (E24).
 
-    A difference that happens to be near 0 says little: the one before, divided by four, is taken where that is larger; by
-    sixteen for a method of order 8, whose halvings fall by 256.
+    The last difference may be near 0 by chance. So the one before, divided by four, is taken if that is larger; for a
+    method of order 8, whose differences fall by 256, it is divided by sixteen.
     """
     sizes = [abs(each.value) for each in halvings]
     last = max(sizes[-1], sizes[-2] / max(4.0, 2.0 ** (0.5 * order))) if len(sizes) > 1 else sizes[-1]
@@ -89,13 +89,13 @@ def beyond(halvings: Sequence[StepChange], order: int = 1) -> float:
 
 
 def biases(halvings: Sequence[StepChange], order: int = 1) -> list[Bias]:
-    """The bias of every step of a ladder, the coarsest first, from the difference of each to the next.
+    """The bias of every step of a ladder, the coarsest first, from the differences of successive steps.
 
     docs/theory/estimators.md, (E24).
 
-    The differences of one ladder are of the same members and are added as they come, halves too, which bounds their sum.
+    All differences of a ladder use the same members. Values and half widths are simply added, which bounds the sum.
 
-    order: of the method, 1 in noise.
+    order: order of the method, 1 with noise.
     """
     if not halvings:
         return [Bias(0.0, float("inf"))]
@@ -108,9 +108,9 @@ def biases(halvings: Sequence[StepChange], order: int = 1) -> list[Bias]:
 
 
 def interval(value: float, sampling_half: float, bias: Bias) -> tuple[float, float]:
-    """The 95 % interval of a value whose bias is told and not taken off.
+    """The 95 % interval of a value whose bias is reported but not subtracted.
 
-    What is random of both adds in squares; the bias itself widens the side on which the truth then lies.
+    The random errors of both are added in squares; the bias widens the interval on the side where the true value lies.
     """
     half = float(np.hypot(sampling_half, bias.half))
     return value - max(bias.value, 0.0) - half, value - min(bias.value, 0.0) + half

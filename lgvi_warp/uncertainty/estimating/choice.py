@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The choice of an estimator by predicted cost: plain, replicates of Sobol points, regression, and levels of either."""
+"""Choice of an estimator by predicted cost: plain, replicates of Sobol points, regression, or levels."""
 
 from __future__ import annotations
 
@@ -38,10 +38,10 @@ FEWEST = 4 * REPLICATES
 
 @dataclass(frozen=True)
 class Way:
-    """A way to estimate: settings from the finest to the coarsest, by their numbers in the pilot, and members of each level.
+    """A way to estimate: indices of settings in the pilot, from the finest to the coarsest, and members of each level.
 
-    slopes: of each level but the last, what the coarser setting counts.
-    seconds, variance: predicted with these members.
+    slopes: factor of the coarser setting, for each level except the last.
+    seconds, variance: predictions with these members.
     """
 
     kind: str
@@ -53,7 +53,7 @@ class Way:
 
     @property
     def name(self) -> str:
-        """The estimator in words."""
+        """Name of the estimator."""
         if len(self.chain) == 1:
             return {"plain": "plain Monte Carlo"}.get(self.kind, self.kind)
         return "levels of sobol" if self.kind == "sobol" else "levels"
@@ -61,12 +61,12 @@ class Way:
 
 @dataclass(frozen=True)
 class Observed:
-    """Observations of a pilot: contributions of the same members in settings, the finest first, and what these cost.
+    """Observations of a pilot: contributions of the same members in several settings, the finest first.
 
-    z: (settings, n). normals: (n, d) of the members' numbers. least: smallest change of a contribution.
-    costs: of a member alone [s]. pair: cost of a member of two settings, by their numbers [s]. settings: in the same order.
-    at: the target, by which contributions were formed. alone: by the number of a setting, contributions of more members.
-    call: what a call takes by itself [s]. weight: of all contributions. reach: as in `Level`.
+    z: contributions (settings, n). normals: (n, d) of the members' numbers. least: smallest change of a contribution.
+    costs: cost of a member in each of `settings` [s]. pair: cost of a member in two settings, by index [s].
+    at: the solved target that defines the contributions. alone: index of a setting -> contributions of more members.
+    call: fixed cost of a call [s]. weight: weight of all contributions. reach: as in `Level`.
     """
 
     z: Sequence[np.ndarray]
@@ -83,7 +83,7 @@ class Observed:
 
 
 def candidates(seen: Observed, variance: float, only: str | None = None) -> list[Way]:
-    """All ways to reach a variance, the cheapest first; only: of an estimator, in front of all others where there is any."""
+    """All ways to reach a variance, the cheapest first; only: an estimator whose ways come before all others."""
     asked = only is not None and only.startswith("levels")
     chains = [(0,)] + [chain for k in (2, 3) for chain in coupled(seen, k, asked)]
     kinds = ["plain"] + (["sobol"] if seen.normals.shape[1] else [])
@@ -99,7 +99,7 @@ def candidates(seen: Observed, variance: float, only: str | None = None) -> list
 
 
 def coupled(seen: Observed, count: int, asked: bool = False) -> list[tuple[int, ...]]:
-    """Chains of so many settings of which each is much cheaper than the one before, and follows it; asked: at any cost."""
+    """Chains of `count` settings, each correlated with the one before and much cheaper; asked: True allows any cost."""
     chains = []
     for rest in itertools.combinations(range(1, len(seen.z)), count - 1):
         chain = (0, *sorted(rest, key=lambda i: -seen.costs[i]))
@@ -143,10 +143,10 @@ def _spread(seen: Observed, kind: str, z: np.ndarray, cost: float, weight: float
 
 
 def rounded(kind: str, members: float, dimensions: int, power: float = 1.0) -> int:
-    """A number of members as an estimator takes it.
+    """Round a number of members to one that the estimator accepts.
 
-    Powers of two of Sobol points in each replicate are balanced, which pays where the variance falls faster than members
-    grow; elsewhere an eighth of a power is fine enough.
+    Replicates of a power of two of Sobol points are balanced, which pays if the variance falls faster than 1 / members;
+    otherwise a multiple of an eighth of a power is fine enough.
     """
     if kind == "sobol":
         points = max(members / REPLICATES, 4.0)
@@ -158,7 +158,7 @@ def rounded(kind: str, members: float, dimensions: int, power: float = 1.0) -> i
 
 
 def gains(ways: Sequence[Way]) -> dict[str, float]:
-    """By estimator, how many times less than plain Monte Carlo in the same setting its best way is predicted to cost."""
+    """Estimator -> predicted cost of plain Monte Carlo in the same setting, divided by the cost of its best way."""
     plain = next(way.seconds for way in ways if way.kind == "plain" and len(way.chain) == 1)
     best: dict[str, float] = {}
     for way in ways:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The setting whose statistic is estimated: the step of a ladder that is predicted to cost least, with its bias."""
+"""The setting whose statistic is estimated: the step of a ladder with the lowest predicted cost, with its bias."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ ANOTHER = 0.3
 
 @dataclass(frozen=True)
 class Chosen:
-    """A setting, its bias, how that was told, and the error that is left to sampling.
+    """A setting, its bias, the reference of the bias, and the requested error.
 
-    place: of the setting in the ladder.
+    place: index of the setting in the ladder.
     """
 
     ladder: Ladder
@@ -42,12 +42,12 @@ class Chosen:
 
     @property
     def variance(self) -> float:
-        """The variance of sampling that the error leaves; a quarter of its square where the bias takes it all."""
+        """The sampling variance that the error leaves; a quarter of its square if the bias uses all of it."""
         return max(self.error**2 - self.bias.mean_square, 0.25 * self.error**2, 1e-300)
 
 
 def setting_of(pilot: Pilot, ladders: Sequence[Sequence[Setting]], fixed: bool, own: Setting | None) -> Chosen:
-    """Climb the ladders and choose the setting that is predicted to cost least; the own step where members are few."""
+    """Run the ladders and choose the setting with the lowest predicted cost, or the scene's own for few members."""
     climbed = list[Chosen]()
     own = ladders[0][-2] if fixed else own
     if own is not None and seems_few(pilot, ladders[0]) and (ladder := at_once(pilot, own)):
@@ -78,7 +78,7 @@ def setting_of(pilot: Pilot, ladders: Sequence[Sequence[Setting]], fixed: bool, 
 
 
 def worth_another(pilot: Pilot, first: Chosen) -> bool:
-    """Whether another method's ladder pays: where the first does not keep the error, or costs little beside the run."""
+    """True if another method's ladder pays: the first does not keep the error, or is cheap compared with the run."""
     if first.bias.mean_square > first.error**2:
         return True
     best = candidates(observed(pilot, first.setting, [], pilot.first), first.variance)[0]
@@ -86,7 +86,7 @@ def worth_another(pilot: Pilot, first: Chosen) -> bool:
 
 
 def seems_few(pilot: Pilot, steps: Sequence[Setting]) -> bool:
-    """Whether plain Monte Carlo needs few members, by the coarsest step that runs."""
+    """True if plain Monte Carlo needs few members, judged by the coarsest step that runs."""
     for setting in steps:
         ladder = Ladder()
         if runs_at(pilot, setting, ladder):
@@ -95,12 +95,12 @@ def seems_few(pilot: Pilot, steps: Sequence[Setting]) -> bool:
 
 
 def price(pilot: Pilot, chosen: Chosen) -> float:
-    """Cost of a member over the remaining variance [s]."""
+    """Cost of a member [s] divided by the remaining variance."""
     return pilot.runs.cost(chosen.setting, pilot.grid(chosen.setting)) / chosen.variance
 
 
 def choice_of(pilot: Pilot, ladder: Ladder, fixed: Setting | None) -> Chosen:
-    """The setting of a ladder, and its bias."""
+    """Choose the setting of a ladder, with its bias."""
     last = ladder.settings[-1]
     error = pilot.asked(pilot.solved(last, pilot.first))
     if not error > 0.0:
@@ -114,7 +114,7 @@ def choice_of(pilot: Pilot, ladder: Ladder, fixed: Setting | None) -> Chosen:
 
 
 def with_rounding(pilot: Pilot, chosen: Chosen) -> Chosen:
-    """The same with the bias of a precision other than double, which no step of that precision shows."""
+    """The choice with the bias of single precision added, which differences of steps do not show."""
     setting = chosen.setting
     if setting.dtype == "float64":
         return chosen
@@ -125,7 +125,7 @@ def with_rounding(pilot: Pilot, chosen: Chosen) -> Chosen:
 
 
 def difference_of(pilot: Pilot, setting: Setting, twin: Setting) -> StepChange:
-    """Change of the target from a setting to the same in double precision; SceneError where members fail there."""
+    """Change of the target from a setting to the same in double precision; SceneError if members fail there."""
     y = pilot.y(twin, pilot.grid(setting), pilot.first)
     if not np.isfinite(y).all():
         raise failing(twin, y)
@@ -133,7 +133,7 @@ def difference_of(pilot: Pilot, setting: Setting, twin: Setting) -> StepChange:
 
 
 def compared(pilot: Pilot, best: Chosen, others: Sequence[Chosen]) -> Chosen:
-    """The same with what another method differs by: where the two disagree the bias may be as large; and notes."""
+    """Compare with other methods: if two methods disagree, the bias is widened by their difference; adds messages."""
     ladder, messages = best.ladder, pilot.messages
     messages += [f"{name} is left out: {why}" for name, why in ladder.refused.items()]
     for other in others if pilot.noise == "none" else ():
@@ -160,20 +160,20 @@ def compared(pilot: Pilot, best: Chosen, others: Sequence[Chosen]) -> Chosen:
 
 
 def constant(pilot: Pilot, setting: Setting) -> bool:
-    """Whether all members have one number since nothing varies."""
+    """True if all members have the same number because nothing varies."""
     return pilot.runs.dimensions == 0 and pilot.noise == "none" and bool(
         np.ptp(pilot.y(setting, pilot.grid(setting), pilot.first)) == 0.0
     )  # fmt: skip
 
 
 def finer(pilot: Pilot, chosen: Chosen) -> Chosen:
-    """The next step of the ladder."""
+    """The choice with the next step of the ladder."""
     place = chosen.place + 1
     return with_rounding(pilot, replace(chosen, place=place, bias=chosen.ladder.biases()[place]))
 
 
 def coarser_than(pilot: Pilot, chosen: Chosen, coarse: Sequence[Sequence[Setting]]) -> list[Setting]:
-    """Coarser settings that levels may stand on: of the ladder, and the longest steps of the cheaper scenes."""
+    """Coarser settings for levels: from the ladder, and the longest steps of the cheaper scenes."""
     top, found = chosen.setting, list[Setting]()
     if chosen.ladder.end == "apart" or pilot.noise == "free":
         return []

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`estimate`: a statistic at the error asked for, for the least work."""
+"""`estimate`: estimate a statistic to a requested error at the lowest cost."""
 
 from __future__ import annotations
 
@@ -68,56 +68,53 @@ def estimate(
 ) -> Estimated:
     """Estimate a mean, probability or quantile to a requested accuracy at the lowest cost.
 
-    A pilot runs few members at several steps. It estimates the bias of each, and the cost of plain Monte Carlo, Sobol points,
-    regression and levels (paired differences of fine and coarse settings). The cheapest is run with numbers of members that
-    are fixed beforehand.
+    A pilot runs few members at several steps. It estimates the bias of each step, and the cost of plain Monte Carlo,
+    Sobol points, regression and levels (paired differences of fine and coarse settings). The cheapest estimator is then
+    run with numbers of members that are fixed beforehand.
 
-    Choices follow counted costs: steps times the evaluations of forces of each. One seed gives one answer, to the bit, on any
-    number of threads. `found.recipe` holds what was chosen, so that the same members can be run again later.
+    Choices depend on counted costs: steps times force evaluations per step. So one seed gives one answer, to the bit, on
+    any number of threads. `found.recipe` of the answer stores the choices, so that the same members can be run again later.
 
-    A sample of n members can miss a fraction of up to 3 / n of all members that behaves differently. To estimate its
-    effect, 512 to 2,048 members spread over all input values are run, and probes far from the middle. A message names the
-    fraction that a mean may have missed. Rare values of a Choice are separate strata.
+    A sample of n members can miss a fraction of up to 3 / n of all members that behaves differently. To estimate the
+    effect of such members, 512 to 2,048 members spread over all input values are run, and probes far from the middle. A
+    message gives the fraction that a mean may have missed. Rare values of a Choice are separate strata.
 
     Args:
-        fleet: the ensemble, or a Scene with one. Its distributions are drawn from anew; members and sampling do not matter.
-        of: statistic to estimate, at the end of the run: "mean position[0]", "depth above 3", "outcome floor", "max(depth)",
-            lw.statistics.Mean, Exceedance, Outcome, FirstPassage or Quantiles of one level, or a metric such as
-            lw.metrics.ITAE("depth").
-        error: requested root mean square error, of sampling and bias together, in the unit of the statistic; above 0.
-        relative_error: the same as a fraction of the statistic, in place of `error`.
+        fleet: the ensemble, or a Scene with one. New members are drawn from its distributions; its sampling is not used.
+        of: statistic to estimate, at the end of the run: a text such as "mean position[0]", "depth above 3", "outcome
+            floor" or "max(depth)"; lw.statistics.Mean, Exceedance, Outcome, FirstPassage or Quantiles with one level;
+            or a metric such as lw.metrics.ITAE("depth").
+        error: requested root mean square error from sampling and bias together, in the unit of the statistic; above 0.
+        relative_error: requested error as a fraction of the statistic, instead of `error`.
         t1: end time [s]. Default: run.duration of the scene.
-        risk: risk of a quantity or a metric: "mean" (the default), the level of a quantile, such as 0.95, or
-            lw.metrics.CVaR(0.05).
-        cheaper: scenes that cost less and behave alike: numbers that differ, such as {"controller.delay": 0.0}, or Scenes.
-            They serve as coarse levels alone. Default none.
-        method: fixes the method. Default: the scene's own, and one that suits what acts.
-        h: fixes the step [s], whose bias is reported; with the scene's method unless `method` is given.
-        dtype: fixes the precision, of coarse levels too. Default: that of the scene, and "float32" of coarse levels that gain
-            by it.
-        estimator: fixes the estimator: "plain Monte Carlo", "sobol", "regression", "levels" or "levels of sobol". Default:
-            the one that is predicted to cost least.
-        recipe: `found.recipe` of an answer: the same members are run again, without a pilot, and the error, the setting, the
-            estimator and the seed are those of the recipe. Fleet, `of`, `risk` and `cheaper` must be as they were.
-        heavy_tail: True reports a mean even if its variance seems to be infinite. Default False: it is refused.
-        seed: seed of points and noise. Default: that of the ensemble.
+        risk: for a quantity or a metric: "mean" (the default), a quantile's level, such as 0.95, or lw.metrics.CVaR(0.05).
+        cheaper: scenes that cost less and behave similarly, as tables of changed numbers, such as {"controller.delay":
+            0.0}, or as Scenes. They serve only as coarse levels. Default none.
+        method: fixes the method. Default: the scene's own, and one that suits its terms.
+        h: fixes the step [s], and its bias is reported; the method is the scene's unless `method` is given.
+        dtype: fixes the precision, also of coarse levels. Default: the scene's, and "float32" for some coarse levels.
+        estimator: fixes the estimator: "plain Monte Carlo", "sobol", "regression", "levels" or "levels of sobol".
+            Default: the estimator with the lowest predicted cost.
+        recipe: `found.recipe` of an earlier answer: the same members are run again, without a pilot. Error, setting,
+            estimator and seed are taken from the recipe. Fleet, `of`, `risk` and `cheaper` must be the same as before.
+        heavy_tail: True reports a mean even if its variance seems to be infinite. Default False: such a mean is refused.
+        seed: seed of points and noise. Default: the ensemble's seed.
         threads: threads of the runs. Default: as in `lw.solve`.
-        executor: "threads" (default), "processes" or "dask", or an object that runs blocks. Other than with threads, the cost
-            is the elapsed time.
+        executor: "threads" (default), "processes" or "dask", or an object that runs blocks. Costs are processor times
+            with threads, else wall times.
         scheduler: address of Dask's scheduler.
-        store: folder for the results of runs: the same call continues from there after an interruption, with the same answer.
-            A folder of other arguments is refused. Default: none.
-        progress: True shows a bar or lines, as in lw.solve; a function is called with the fraction of the work that is done,
-            from 0 to 1.
+        store: folder for the results of runs: the same call continues from there after an interruption, with the same
+            answer. A folder with results for other arguments is refused. Default: none.
+        progress: True shows a bar or lines, as in lw.solve; a function is called with the completed fraction, from 0 to 1.
 
     Returns:
-        The value, its interval and what it took; `print` shows it.
+        The value, its interval and its cost; `print` shows a report.
 
     Raises:
-        SceneError: for faulty arguments, for a statistic of another kind or without finite variance, where members fail at the
-            finest setting, and if the given estimator is not possible.
+        SceneError: if arguments are faulty, the statistic has another kind or no finite variance, members fail at the
+            finest setting, or the given estimator is not possible.
         OSError: if `store` cannot be written.
-        KeyboardInterrupt: if Ctrl-C interrupts it. The message reports the progress; there is no answer.
+        KeyboardInterrupt: if Ctrl-C interrupts the call. The message reports the progress; there is no answer.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -181,7 +178,7 @@ def estimate(
 
 
 def recipe_of(recipe: Mapping[str, Any], question: Question, scenes: int) -> tuple[int, float]:
-    """Seed and end time of a recipe; SceneError where it is none, or of another question."""
+    """Seed and end time of a recipe; SceneError if it is not a recipe, or belongs to another question."""
     remedy = "give found.recipe of an answer to the same question"
     try:
         seed, t1, label = int(recipe["seed"]), float(recipe["t1"]), recipe["of"]
@@ -208,7 +205,7 @@ def recipe_of(recipe: Mapping[str, Any], question: Question, scenes: int) -> tup
 
 
 def own_setting(fleet: Ensemble, t1: float, ladders: Sequence[Sequence[Setting]]) -> Setting | None:
-    """The scene's own step, as it is made, with its own method, or the first one's; None where the scene has none."""
+    """The scene's own step, as runs take it, with the scene's or the first method; None if the scene has no step."""
     run = fleet.scene.run
     if run.step is None:
         return None
@@ -222,7 +219,7 @@ def own_setting(fleet: Ensemble, t1: float, ladders: Sequence[Sequence[Setting]]
 
 
 def drawn(fleet: Ensemble) -> Ensemble:
-    """The same variation, of which other points are drawn; SceneError where members have numbers that none draws."""
+    """The fleet to draw other members from; SceneError if members have numbers without a distribution."""
     own = dict.fromkeys([*fleet.sampling.own_values(), *fleet.sampling.distributions(), *fleet.explicit()])
     names = [name for name in own if name not in ("indices", "points")]
     if names:
@@ -233,7 +230,7 @@ def drawn(fleet: Ensemble) -> Ensemble:
 
 
 def cheaper_fleets(fleet: Ensemble, cheaper: Sequence[Any]) -> list[Ensemble]:
-    """The same variation of each cheaper scene; names of what varies that a change fixes stay varied."""
+    """Ensembles of the cheaper scenes with the same distributions; a varied number varies even if a change sets it."""
     listed = items_of(cheaper)
     if listed is None:
         raise refusal("cheaper", cheaper, "is not a list of scenes", 'give [{"controller.delay": 0.0}]')
@@ -252,7 +249,7 @@ def cheaper_fleets(fleet: Ensemble, cheaper: Sequence[Any]) -> list[Ensemble]:
 
 
 def spacing_of(scene: Any, t1: float) -> Fraction:
-    """The longest step that a scene takes [s]: it divides the run, the samples, and the times of the controller."""
+    """The longest possible step of a scene [s]: it divides the run, the sample times, and the controller's times."""
     times = [t1]
     every, controller = scene.run.save_every, scene.controller
     if every is not None and every <= t1:
@@ -266,9 +263,9 @@ def spacing_of(scene: Any, t1: float) -> Fraction:
 def ladders_of(
     fleet: Ensemble, t1: float, spacing: Fraction, methods: Sequence[Any] | None, h: float | None, dtype: str | None
 ) -> tuple[list[list[Setting]], str]:
-    """Settings to try by method, the coarsest step first, the asked one last but one; and how noise acts.
+    """Settings to try for each method, the coarsest step first, a requested step last but one; and the kind of noise.
 
-    Returns: The settings; and "none", "grid" where settings may share a path of noise, or "free" where they cannot.
+    Returns: The settings; and "none", "grid" if settings can share a noise path, or "free" if they cannot.
     """
     scene = fleet.scene
     dtype = scene.run.dtype if dtype is None else dtype
@@ -303,7 +300,7 @@ def ladders_of(
 
 
 def short_and_own(fleet: Ensemble, alone: bool) -> Sequence[Any]:
-    """The method that is cheapest mostly by what acts, the scene's own, and more; alone: the scene's own if any."""
+    """Methods to try: the usually cheapest, the scene's own, and others; alone: only the scene's own, if any."""
     own, noisy = fleet.scene.run.method, any(isinstance(term, NoisyTerm) for term in fleet.scene.terms)
     kind = "noisy" if noisy else "damped" if is_damped(fleet) else "conservative"
     if own is None:
@@ -314,6 +311,6 @@ def short_and_own(fleet: Ensemble, alone: bool) -> Sequence[Any]:
 
 
 def coarse_of(spacing: Fraction, scene: int, like: Setting) -> list[Setting]:
-    """Steps of a cheaper scene, the longest first, down to the coarsest one of the scene itself."""
+    """Settings of a cheaper scene, the longest step first, down to the coarsest step of the scene itself."""
     steps = [float(spacing / 2**k) for k in range(4)]
     return [replace(like, h=step, scene=scene) for step in steps if step > 0.4 * like.h] or [replace(like, scene=scene)]

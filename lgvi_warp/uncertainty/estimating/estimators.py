@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Estimators of a mean by formula: plain, replicates of a design, regression, and sums of levels; and the best numbers."""
+"""Estimators of a mean: plain, replicates of a design, regression, sums of levels; and optimal numbers of members."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ BELIEVED = 0.8
 
 @dataclass(frozen=True)
 class MeanEstimate:
-    """An estimate, the variance of it, and the degrees of freedom that this variance was estimated with."""
+    """An estimate, its variance, and the degrees of freedom of this variance."""
 
     value: float
     variance: float
@@ -40,21 +40,21 @@ class MeanEstimate:
         return float(stdtrit(max(self.freedom, 1.0), 0.5 + 0.5 * confidence)) * math.sqrt(self.variance)
 
     def times(self, weight: float) -> MeanEstimate:
-        """The estimate of so many times what this one is of."""
+        """The estimate times a weight."""
         return MeanEstimate(weight * self.value, weight**2 * self.variance, self.freedom)
 
 
 def plain(y: np.ndarray, least: float = 0.0) -> MeanEstimate:
     """The mean of independent members (n,).
 
-    least: change of a member's number that may be unseen: the variance that so many unseen members leave is added.
+    least: change of a member's number that the sample may have missed; its possible variance is included.
     """
     n = len(y)
     return MeanEstimate(float(np.mean(y)), float(np.var(y, ddof=1)) / n + (UNSEEN * least / n) ** 2, n - 1.0)
 
 
 def replicated(y: np.ndarray, least: float = 0.0, replicates: int = REPLICATES) -> MeanEstimate:
-    """The mean of members (n,) of independent replicates of a design, member i of replicate i mod R: Student's t of R - 1.
+    """The mean of members (n,) of R independent replicates of a design; member i is in replicate i mod R.
 
     docs/theory/estimators.md, (E13).
 
@@ -81,9 +81,9 @@ def regressed(y: np.ndarray, normals: np.ndarray, least: float = 0.0) -> MeanEst
 
 
 def fitted(y: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Constant and slopes (d + 1,) of numbers (n,) by normals (n, d), and what they leave (n,).
+    """Constant and slopes (d + 1,) of a regression of numbers (n,) on normals (n, d), and the residuals (n,).
 
-    The normal equations are well conditioned here. BLAS would start all threads of the machine for tall matrices.
+    Normal equations are well conditioned here; for tall matrices BLAS would start all threads of the machine.
     """
     columns = np.column_stack([np.ones(len(y)), normals])
     gram = np.einsum("ni,nj->ij", columns, columns)
@@ -103,11 +103,11 @@ def together(parts: Sequence[MeanEstimate]) -> MeanEstimate:
 
 
 def slope(fine: np.ndarray, coarse: np.ndarray) -> tuple[float, float]:
-    """The factor of the coarse numbers that leaves the least of the fine ones' variance, and what part of it is left.
+    """The factor of the coarse numbers that minimises the variance of the difference, and the fraction that is left.
 
     docs/theory/estimators.md, (E21).
 
-    The part left is 1 - rho^2; 1 where either does not vary, or overflows.
+    The fraction left is 1 - rho^2; it is 1 if either does not vary, or overflows.
     """
     with np.errstate(over="ignore", invalid="ignore"):  # numbers of steps that are too long may be huge
         a, b = fine - fine.mean(), coarse - coarse.mean()
@@ -120,7 +120,7 @@ def slope(fine: np.ndarray, coarse: np.ndarray) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class VarianceModel:
-    """The variance of an estimate by number of members: `of_one` n^-power + (unseen / n)^2; cost: of a member [s]."""
+    """Variance of an estimate with n members: `of_one` n^-power + (unseen / n)^2; cost: cost of a member [s]."""
 
     of_one: float
     cost: float
@@ -128,7 +128,7 @@ class VarianceModel:
     unseen: float = 0.0
 
     def at(self, members: float) -> float:
-        """The variance with so many members."""
+        """The variance with this number of members."""
         return self.of_one * members**-self.power + (self.unseen / members) ** 2
 
 
@@ -140,9 +140,9 @@ def spread_of_plain(y: np.ndarray, cost: float, least: float = 0.0) -> VarianceM
 def spread_of_replicates(y: np.ndarray, cost: float, least: float = 0.0) -> VarianceModel:
     """Model of the variance of a replicated design's mean, from some of its members (n,), in the order of the design.
 
-    Variances of 16 replicates are known to a third. Where they gain less than three times over independent members, as where
-    noise acts, most of the gain's logarithm is believed. Elsewhere a quarter of the points shows how fast the variance
-    falls, and half of what exceeds the power 1 is taken.
+    Variances of 16 replicates are known to a third. If they gain less than three times over independent members, as
+    with noise, most of the gain's logarithm is trusted. Otherwise a quarter of the points shows how fast the variance
+    falls with n, and half of the exponent's excess over 1 is used.
     """
     n = len(y)
     variance, alone, power = replicated(y, least).variance, plain(y, least).variance, 1.0
@@ -156,9 +156,10 @@ def spread_of_replicates(y: np.ndarray, cost: float, least: float = 0.0) -> Vari
 
 
 def best_numbers(spreads: Sequence[VarianceModel], variance: float) -> np.ndarray:
-    """Numbers of members (levels,) that reach a variance of the sum; but for unseen members, for the least cost.
+    """Numbers of members (levels,) that reach a variance of the sum, with the lowest cost apart from unseen members.
 
-    Where unseen members count, each level gets what makes them a part of the variance, and all grow alike until it is reached.
+    If unseen members count, each level gets enough members to limit their share of the variance; then all levels grow
+    by one factor until the variance is reached.
     """
     numbers, unseen = numbers_without_unseen(spreads, variance), np.array([each.unseen for each in spreads])
     if not unseen.any() or not variance > 0.0:
@@ -173,12 +174,12 @@ def best_numbers(spreads: Sequence[VarianceModel], variance: float) -> np.ndarra
 
 
 def numbers_without_unseen(spreads: Sequence[VarianceModel], variance: float) -> np.ndarray:
-    """Numbers of members (levels,) that reach a variance of the sum for the least cost.
+    """Numbers of members (levels,) that reach a variance of the sum at the lowest cost.
 
     docs/theory/estimators.md, (E22).
 
-    The least of sum C n subject to sum V n^-a = v is where n = (m a V / C)^(1 / (1 + a)), with one m for all; where all a are
-    1, n = sqrt(V / C) sum sqrt(V C) / v.
+    The minimum of sum C n subject to sum V n^-a = v is at n = (m a V / C)^(1 / (1 + a)), with one m for all levels; if
+    all a are 1, n = sqrt(V / C) sum sqrt(V C) / v.
     """
     ones = np.array([max(spread.of_one, 1e-300) for spread in spreads])
     powers, costs = (np.array([getattr(spread, name) for spread in spreads]) for name in ("power", "cost"))
@@ -199,11 +200,11 @@ def numbers_without_unseen(spreads: Sequence[VarianceModel], variance: float) ->
 
 
 def tail_index(y: np.ndarray, part: int = 32) -> float:
-    """The exponent by which the largest distances from the median fall off; below 2 the variance is infinite.
+    """Tail exponent of the largest distances from the median; below 2 the variance is infinite.
 
-    Of the largest 32nd of the members, or another part, at least 16. Where a power law holds, i log(y_i / y_i+1) of the i-th
-    largest are exponential, with its inverse as mean (Renyi 1953). Their median does not see the gaps between clusters, as
-    members that stopped leave them. Infinite where these are all alike, or where members are too few.
+    It uses the largest 1/32 of the members, or another fraction, at least 16. Under a power law, i log(y_i / y_i+1) of
+    the i-th largest are exponential, with the inverse exponent as mean (Renyi 1953). Their median ignores gaps between
+    clusters, such as those from stopped members. Infinite if all these distances are equal, or with too few members.
     """
     far = np.sort(np.abs(y - np.median(y)))[::-1]
     k = max(16, len(y) // part)

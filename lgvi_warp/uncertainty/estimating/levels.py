@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Runs of settings on points of the cube: the numbers of their members, what they cost, and levels of paired settings."""
+"""Runs of settings on points of the unit cube, their costs, and levels of paired settings."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ SINGLE, CHEAPER = 0.55, 0.5
 class Setting:
     """Setting of members' runs.
 
-    Method, step [s], precision, and which scene, 0 the user's, others the cheaper ones in order.
+    Method, step [s], precision, and index of the scene: 0 is the user's, the cheaper ones follow.
     """
 
     method: Any
@@ -53,7 +53,7 @@ class Setting:
 
     @property
     def kind(self) -> tuple[Any, ...]:
-        """Common key of settings that differ in their steps alone."""
+        """Common key of settings that differ only in their steps."""
         return self.method, self.dtype, self.scene
 
     def options(self) -> dict[str, Any]:
@@ -61,7 +61,7 @@ class Setting:
         return {"method": self.method, "h": self.h, "dtype": self.dtype}
 
     def to_dict(self) -> dict[str, Any]:
-        """Convert it to plain values, for JSON."""
+        """Convert the setting to plain values, for JSON."""
         return asdict(self)  # a Method is a dict then
 
     @classmethod
@@ -74,13 +74,13 @@ class Setting:
 class Runs:
     """Runs of one question in any setting, each prepared once.
 
-    fleets: the user's ensemble, then the cheaper scenes' with the same variation.
-    strata: of the user's ensemble, the common one first.
-    counted: counted time of all calls so far, which is the same in every call of `lw.estimate` [s].
-    seconds: processor time of all runs so far, prepared and called, without preparing the first run of each kernel, which
-        loads or compiles it [s].
+    fleets: the user's ensemble, then those of the cheaper scenes with the same distributions.
+    strata: strata of the user's ensemble, the common one first.
+    counted: predicted time of all calls so far by counted steps, the same whenever `lw.estimate` is called [s].
+    seconds: processor time of all runs so far, including preparation, except for the first run of each kernel, whose
+        preparation loads or compiles it [s].
     execution: threads, executor and scheduler, as in `lw.prepare`.
-    remembered: where calls are kept; None for nowhere.
+    remembered: store of calls; None stores nothing.
     """
 
     def __init__(
@@ -101,7 +101,7 @@ class Runs:
         self.dimensions = fleets[0].space.dimensions
 
     def prepared(self, setting: Setting, grid: float | None) -> Prepared:
-        """The run of a setting, with noise on a grid [s], None for draws once a step; SceneError where it is refused."""
+        """The run of a setting with noise on a grid [s], None for draws once per step; SceneError if it is refused."""
         key = setting, grid
         if key not in self._prepared:
             begun, fleet = self._clock(), self._fleets[setting.scene]
@@ -121,7 +121,7 @@ class Runs:
     def __call__(
         self, setting: Setting, grid: float | None, points: np.ndarray, indices: np.ndarray, stratum: int = 0
     ) -> np.ndarray:
-        """The numbers of members (n,) at points (n, d) of a stratum, with noise of these indices; NaN where they failed."""
+        """Numbers of members (n,) at points (n, d) of a stratum, with noise of these indices; NaN if they failed."""
         run, n = self.prepared(setting, grid), len(points)
         groups, points = [], self.strata[stratum].placed(points)
         self.counted += CALL + n * self.cost(setting, grid)
@@ -156,7 +156,7 @@ class Runs:
         return sum(call.members for call in self._calls)
 
     def cost(self, setting: Setting, grid: float | None = None) -> float:
-        """Counted time of a member [s]: evaluations of forces, and draws of noise on a grid [s]."""
+        """Predicted time of a member [s], by counts of force evaluations and of noise draws on a grid."""
         method = Method(setting.method) if isinstance(setting.method, str) else setting.method
         each = method.gauss * 8 or (len(method.tableau.b) if method.tableau else len(method.stages))
         one = EVALUATION * each * (SINGLE if setting.dtype != "float64" else 1.0) * (CHEAPER if setting.scene else 1.0)
@@ -183,16 +183,16 @@ class Call:
 
 
 def member_cost(calls: Sequence[Call], h: float, draw: float, others: Sequence[Call] = ()) -> float:
-    """The processor time of a member [s], as `fitted`; what a call takes by itself is no cost of a member."""
+    """The processor time of a member [s], by `fitted`; the fixed cost of a call is not included."""
     cost = float(fitted(calls, others)[1:4] @ (1.0, 1.0 / h, 1.0 / draw))
     # Where all is taken for the calls' own, the cheapest call bounds it.
     return max(cost, 1e-2 * min(call.seconds / call.members for call in calls))
 
 
 def fitted(calls: Sequence[Call], others: Sequence[Call] = ()) -> np.ndarray:
-    """Processor time by least squares over calls: per call, member, step and draw, none below 0 [s]. Relative residuals count.
+    """Processor time per call, member, step and draw [s], by non-negative least squares over calls.
 
-    others: calls of other kinds, which take as much by themselves.
+    others: calls of other kinds, with the same fixed cost of a call.
     """
     from scipy.optimize import nnls
 
@@ -208,11 +208,11 @@ def fitted(calls: Sequence[Call], others: Sequence[Call] = ()) -> np.ndarray:
 
 
 def design(seed: int, name: str, dimensions: int, first: int, count: int, replicates: int = REPLICATES) -> np.ndarray:
-    """Members of replicates of Sobol points (count, d), from a member on: member i is point i // R of replicate i mod R.
+    """Points (count, d) of Sobol replicates from member `first`: member i is point i // R of replicate i mod R.
 
-    A replicate is one scrambled sequence with a digital shift of its own.
+    A replicate is one scrambled sequence with its own digital shift.
 
-    replicates: 0 for independent points, of which a count of each name is drawn once.
+    replicates: number R of replicates; 0 for independent points, drawn for each name and first member.
     """
     if not replicates:
         return np.asarray(generator(seed, f"{name} {first}").random((count, dimensions)))
@@ -224,14 +224,14 @@ def design(seed: int, name: str, dimensions: int, first: int, count: int, replic
 
 @dataclass
 class Level:
-    """Members of a setting and, on the same points and noise, of a coarser one times a slope.
+    """Members of a setting, paired with a coarser setting times a slope on the same points and noise.
 
-    weight: of the mean of fine less slope times coarse in the sum of all levels.
-    grid: of the noise of both [s]; None for draws once a step.
+    weight: weight of the mean of fine minus slope times coarse in the sum of all levels.
+    grid: time between noise draws of both settings [s]; None for draws once per step.
     kind: "sobol", "plain" or "regression".
     members: number of members, fixed beforehand.
-    reach: how far the number of a member may be that none of few is like; at least their spread.
-    stratum: of which all members are.
+    reach: possible distance of the numbers of unseen members; at least the spread of the members.
+    stratum: index of the stratum of all members.
     """
 
     fine: Setting
@@ -250,7 +250,7 @@ class Level:
     points: list[np.ndarray] = field(default_factory=list)
 
     def to_dict(self) -> dict[str, Any]:
-        """Convert how it is run to plain values, for JSON."""
+        """Convert the level without its results to plain values, for JSON."""
         own = {each.name: getattr(self, each.name) for each in fields(self)[:-3]}
         return own | {"fine": self.fine.to_dict(), "coarse": self.coarse and self.coarse.to_dict()}
 
@@ -261,7 +261,7 @@ class Level:
         return cls(**{**content, "fine": fine, "coarse": coarse})
 
     def grow(self, runs: Runs, count: int) -> None:
-        """Run so many more members."""
+        """Run `count` more members."""
         done = sum(map(len, self.y))
         replicates = REPLICATES if self.kind == "sobol" else 0
         points = design(runs.seed, self.name, runs.dimensions, done, count, replicates)
@@ -272,21 +272,21 @@ class Level:
         self.points.append(points if self.kind == "regression" else points[:, :0])
 
     def failed(self) -> Setting | None:
-        """The setting at which members failed that were run last; None for none."""
+        """The setting at which members of the last round failed; None if none failed."""
         for setting, numbers in ((self.fine, self.y), (self.coarse, self.below)):
             if setting is not None and np.isnan(numbers[-1]).any():
                 return setting
         return None
 
     def more(self, share: float) -> int:
-        """A part of the members of the level so far, in whole replicates; all or three times that where balanced."""
+        """Number of members to add for a share of the present ones; once or three times all for balanced replicates."""
         points = sum(map(len, self.y)) // REPLICATES
         if self.kind == "sobol" and points & (points - 1) == 0:
             return REPLICATES * points * (1 if share <= 1.0 else 3)
         return REPLICATES * math.ceil(share * points)
 
     def weighted(self) -> list[Weighted]:
-        """The level's part in the sum of levels."""
+        """The level's weighted samples in the sum of levels."""
         samples = [(self.weight, np.concatenate(self.y))]
         return [*samples, (-self.weight * self.slope, np.concatenate(self.below))] if self.below else samples
 
@@ -305,26 +305,26 @@ class Level:
 
 
 def normals(points: np.ndarray) -> np.ndarray:
-    """Standard normals of levels, column by column."""
+    """Standard normals from points of the unit cube, column by column."""
     from scipy.special import ndtri
 
     return np.asarray(ndtri(np.clip(points, 2.0**-53, 1.0 - 2.0**-53)))
 
 
 def cube(normals: np.ndarray) -> np.ndarray:
-    """Levels of standard normals."""
+    """Points of the unit cube from standard normals."""
     from scipy.special import ndtr
 
     return np.asarray(ndtr(normals))
 
 
 def samples_of(levels: Sequence[Level]) -> list[Weighted]:
-    """The numbers of all levels, with their weights."""
+    """The weighted samples of all levels."""
     return [sample for level in levels for sample in level.weighted()]
 
 
 def estimated(levels: Sequence[Level], target: Sought) -> tuple[Solved, MeanEstimate]:
-    """The target from all levels, and the estimate of its error. docs/theory/estimators.md, (E20)."""
+    """The target from all levels, and its estimate with error. docs/theory/estimators.md, (E20)."""
     samples = samples_of(levels)
     at = target.solved(samples)
     parts = together([level.part(target, at) for level in levels])

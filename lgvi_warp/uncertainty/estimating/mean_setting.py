@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The cheapest setting whose mean of a quantity has a bias below an error: the ladders of a pilot, and single precision."""
+"""Find the cheapest setting in which a mean has a bias below an error, by ladders of a pilot and single precision."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ ROOM = 1.2
 
 @dataclass(frozen=True)
 class MeanSetting:
-    """A setting, the bias of the mean in it, what a member costs [s], and the finer setting that tells the bias.
+    """A setting, the bias of the mean in it, its cost of a member [s], and the finer setting of the bias estimate.
 
-    members: number of pairs that told it. beyond: what may be left beyond the reference, in the unit of the mean.
+    members: number of pairs for the bias. beyond: bound of the reference's own bias, in the unit of the mean.
     """
 
     setting: Setting
@@ -37,7 +37,7 @@ class MeanSetting:
 
     @property
     def largest(self) -> float:
-        """The farther end of the bias's interval from 0."""
+        """Largest absolute value in the bias's interval."""
         return abs(self.bias.value) + self.bias.half
 
 
@@ -45,10 +45,10 @@ def mean_settings(
     fleet: Ensemble, of: str, error: float, t1: float, methods: Sequence[str] | None, report: Callable[[float], None],
     seconds: float, threads: int | None = None,
 ) -> list[MeanSetting]:  # fmt: skip
-    """Settings whose bias at the end is at most an error, the cheapest first; SceneError where there is none.
+    """Settings whose bias at the end is at most an error, the cheapest first; SceneError if there is none.
 
-    of: the mean of one number, as in `lw.estimate`. methods: to try; None for those of `lw.estimate`. seconds: processor
-        time to spend, about.
+    of: the mean of one number, as in `lw.estimate`. methods: methods to try; None for those of `lw.estimate`. seconds:
+        approximate processor time to spend.
     """
     fleet = drawn(fleet)
     seed = int(EnsembleSettings(1, fleet.seed).seed)
@@ -84,7 +84,7 @@ def mean_settings(
 
 
 def in_ladder(pilot: Pilot, ladder: Ladder) -> list[MeanSetting]:
-    """The steps of a ladder, the coarsest first, with what tells their biases."""
+    """The steps of a ladder, the coarsest first, with their biases."""
     if len(ladder.settings) < 2:
         return []
     last, pairs, rest = ladder.settings[-1], ladder.halvings[-1].members, beyond(ladder.halvings, ladder.order)
@@ -95,7 +95,7 @@ def in_ladder(pilot: Pilot, ladder: Ladder) -> list[MeanSetting]:
 
 
 def in_single(pilot: Pilot, each: MeanSetting) -> MeanSetting | None:
-    """The same setting in single precision, whose difference adds to the bias; None where it is refused or fails."""
+    """The setting in single precision, with the difference added to the bias; None if it is refused or fails."""
     if each.setting.dtype != "float64":
         return None
     twin = Setting(each.setting.method, each.setting.h, "float32", each.setting.scene)

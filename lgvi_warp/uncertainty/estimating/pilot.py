@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The pilot: a few members at ever finer steps, until the bias is small; then what settings share, and what they cost.
+"""The pilot: a few members at ever finer steps until the bias is small; correlation and cost of the settings.
 
-Noise on a grid is drawn at the finer step of each pair, so that both see one path. The pilot costs at most a tenth of what
-plain Monte Carlo is predicted to cost.
+Noise on a grid is drawn at the finer step of each pair, so that both share one path. The pilot costs at most a tenth of
+the predicted cost of plain Monte Carlo.
 """
 
 from __future__ import annotations
@@ -51,15 +51,15 @@ HITS = 4
 
 @dataclass
 class Pilot:
-    """Members of the pilot, whose numbers are kept by setting and grid of the noise [s].
+    """Members of the pilot; their numbers are stored by setting and grid of the noise [s].
 
-    noise: "none", "grid" where settings may share a path, "free" where they cannot.
-    error: asked for; of the value where relative.
-    single: whether coarse levels may be in single precision.
+    noise: "none", "grid" if settings can share a noise path, "free" if they cannot.
+    error: the requested error; a fraction of the value if `relative`.
+    single: True if coarse levels may use single precision.
     estimator: the only one that may be chosen; None for any.
     most: processor time that the pilot may take in any case [s].
-    heavy_tail: whether a mean is told all the same where its variance seems infinite.
-    least: members of the first stage that a rare condition asks for.
+    heavy_tail: True if a mean is reported even if its variance seems infinite.
+    least: minimum number of members of the first stage, for a rare condition.
     """
 
     runs: Runs
@@ -101,7 +101,7 @@ class Pilot:
                 for k, each in enumerate(self.runs.strata)]  # fmt: skip
 
     def solved(self, setting: Setting, members: int) -> Solved:
-        """The target by one setting."""
+        """The target, solved with one setting."""
         return self.target.solved(self.samples(setting, self.grid(setting), members))
 
     def variance(self, setting: Setting, members: int) -> float:
@@ -116,7 +116,7 @@ class Pilot:
             return mean_of(parts, lambda z: (z - mean) ** 2) + (UNSEEN * least) ** 2 / members
 
     def reach(self, setting: Setting) -> float:
-        """Range of numbers that no member of the pilot has, by a look and by probes: of means, and of parts of them."""
+        """Possible distance of unseen members' numbers, by spread members and by probes; for means and cvar."""
         if self.target.unbounded and setting not in self.reaches:
             at, known = self.solved(setting, self.first), normals(self._design("estimate pilot", FIRST))
             z = self.target.contributions(self.y(setting, self.grid(setting), FIRST), at)
@@ -129,7 +129,7 @@ class Pilot:
         return design(self.runs.seed, name, self.runs.dimensions, 0, members)
 
     def _look(self, setting: Setting) -> tuple[np.ndarray, np.ndarray]:
-        """The numbers (m,) and normals (m, d) of members all over the cube, which cost a part of the pilot so far."""
+        """Numbers (m,) and normals (m, d) of members spread over the whole cube, within a share of the cost so far."""
         cost, (fewest, most) = self.runs.cost(setting, self.grid(setting)), LOOKED
         seconds = max(LOOK_SHARE * self.runs.counted, self.most_seconds(setting, self.first))
         members = int(np.clip(seconds / cost, fewest, most)) // REPLICATES * REPLICATES
@@ -140,7 +140,7 @@ class Pilot:
             return np.empty(0), points[:0]
 
     def _probed(self, setting: Setting, members: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The numbers (m,) and normals (m, d) of probes of members (n, d), as far out as none is refused."""
+        """Numbers (m,) and normals (m, d) of probes of members (n, d), at the largest distance that is not refused."""
         for distance in FAR if self.runs.dimensions else ():
             far = probes(self.runs.seed, members, distance)
             with contextlib.suppress(SceneError):
@@ -149,7 +149,7 @@ class Pilot:
 
     @property
     def first(self) -> int:
-        """Members of the first stage: so many that some of them are in the tail of a quantile, or in the worst part."""
+        """Number of members of the first stage: enough to have some in the tail of a quantile or among the worst."""
         tail = self.target.tail
         for members in (*STAGES, *TAIL_STAGES):
             if members * tail >= HITS:
@@ -159,11 +159,11 @@ class Pilot:
         raise refusal("risk", self.runs.question.label, problem, remedy)
 
     def asked(self, at: Solved) -> float:
-        """The error asked for, in the unit of the statistic."""
+        """The requested error, in the unit of the statistic."""
         return self.error * abs(at.value) if self.relative else self.error
 
     def plain_members(self, setting: Setting, members: int, *, unseen: bool = False) -> float:
-        """Number of members that plain Monte Carlo needs; unseen: with those that few members do not show."""
+        """Number of members that plain Monte Carlo needs; unseen: True includes the effect of unseen members."""
         error, variance = self.asked(self.solved(setting, members)), self.variance(setting, members)
         if not error * error > 0.0:
             return math.inf if variance > 0.0 or self.relative else 1.0
@@ -197,7 +197,7 @@ class Pilot:
         return difference(coarser, finer, self.target.least(at))
 
     def check_tail(self, setting: Setting, y: np.ndarray) -> None:
-        """Refuse a mean whose variance seems infinite, unless it was asked for all the same; SceneError."""
+        """Refuse a mean whose variance seems infinite, unless `heavy_tail`; SceneError."""
         if not self.target.unbounded or len(y) < KNOWN or tail_index(y) >= HEAVY:
             return
         y = self.y(setting, self.grid(setting), max(len(y), SURE)) if len(y) < SURE else y
@@ -216,11 +216,11 @@ class Pilot:
 
 @dataclass
 class Ladder:
-    """Steps of one method that were run, the coarsest first; refused: why others were not.
+    """Steps of one method that were run, the coarsest first; refused: setting -> reason.
 
-    halvings: the difference of each step to the next.
-    order: of the method, 1 in noise.
-    end: why it ended: "agree", "apart", "members" (their number leaves the difference open) or "steps".
+    halvings: the differences of successive steps.
+    order: order of the method, 1 with noise.
+    end: reason of the end: "agree", "apart", "members" (too few to decide about the difference) or "steps".
     """
 
     settings: list[Setting] = field(default_factory=list)
@@ -234,7 +234,7 @@ class Ladder:
         return biases_of.biases(self.halvings, self.order)
 
     def settled(self, error: float) -> int:
-        """The coarsest step whose bias takes at most half of the error; where there is none the finest but one."""
+        """Index of the coarsest step whose bias is at most half of the error, or else of the finest but one."""
         if len(self.settings) < 2:
             return 0
         found = [i for i, bias in enumerate(self.biases()) if bias.mean_square <= (0.5 * error) ** 2]
@@ -242,12 +242,12 @@ class Ladder:
 
 
 def climb(pilot: Pilot, steps: Sequence[Setting], fixed: Setting | None = None, most: float = math.inf) -> Ladder:
-    """Run ever finer steps until two agree or members are apart.
+    """Run ever finer steps until two agree or their members are uncorrelated.
 
-    Each step costs 64 members, all together the 128 of the finest: a tenth of plain Monte Carlo where that takes 1,280.
+    Each step costs 64 members, and all together cost 128 of the finest: a tenth of plain Monte Carlo with 1,280.
 
-    fixed: a setting that the caller asked for: the ladder goes on to the one after it and ends.
-    most: a member's cost from which on a step is no gain [s].
+    fixed: a requested setting: the ladder ends one step after it.
+    most: cost of a member above which a step gains nothing [s].
     """
     ladder = Ladder(order=Method(steps[0].method).order if pilot.noise == "none" else 1)
     for setting in steps:
@@ -267,9 +267,9 @@ def climb(pilot: Pilot, steps: Sequence[Setting], fixed: Setting | None = None, 
 
 
 def at_once(pilot: Pilot, own: Setting) -> Ladder | None:
-    """A step that the caller has and half of it, where plain Monte Carlo needs so few members that a pilot does not pay.
+    """A ladder of a given step and half of it, if plain Monte Carlo needs so few members that a pilot does not pay.
 
-    A 16th of them tell the bias. None where it takes more members, or where the step is not taken.
+    One in 16 of the members estimate the bias. None if more members are needed, or the step is refused.
     """
     ladder, half = Ladder(), replace(own, h=0.5 * own.h)
     if not runs_at(pilot, own, ladder):
@@ -287,7 +287,7 @@ def at_once(pilot: Pilot, own: Setting) -> Ladder | None:
 
 
 def runs_at(pilot: Pilot, setting: Setting, ladder: Ladder) -> bool:
-    """Whether a setting is taken and no member fails at it."""
+    """True if a setting is accepted and no member fails at it."""
     try:
         y = pilot.y(setting, pilot.grid(setting), pilot.first)
         if pilot.grid(setting) is not None and ladder.settings:
@@ -307,7 +307,7 @@ def runs_at(pilot: Pilot, setting: Setting, ladder: Ladder) -> bool:
 
 
 def _first_look(pilot: Pilot, setting: Setting) -> None:
-    """Take more members at the coarsest step where few have a number other than 0 and the error is relative."""
+    """Take more members at the coarsest step if the error is relative and few members have a number other than 0."""
     varies = pilot.runs.dimensions or pilot.noise != "none"
     if not (pilot.relative and varies) or pilot.target.kind == "quantile":
         return
@@ -326,7 +326,7 @@ def _first_look(pilot: Pilot, setting: Setting) -> None:
 
 
 def _compared(pilot: Pilot, ladder: Ladder) -> StepChange:
-    """The last halving, of as many members as it takes to know whether it is small, and as are worth their cost."""
+    """The last halving, with as many members as are needed to decide whether it is small, and worth their cost."""
     for members in (n for n in (*STAGES, *HIT_STAGES) if pilot.first <= n <= max(pilot.first, STAGES[-1])):
         found = pilot.pair(ladder.settings[-2], ladder.settings[-1], members)
         small = AGREE * pilot.asked(pilot.solved(ladder.settings[-1], pilot.first))
@@ -337,12 +337,12 @@ def _compared(pilot: Pilot, ladder: Ladder) -> StepChange:
 
 
 def _stalls(ladder: Ladder, answer: StepChange, small: float) -> bool:
-    """Whether a finer step would not make the pairs agree much better than more of them do."""
+    """True if more pairs help as much as a finer step would."""
     return answer.half <= 4.0 * small or bool(ladder.halvings and answer.half > STALLED * ladder.halvings[-1].half)
 
 
 def _too_dear(pilot: Pilot, ladder: Ladder, members: int) -> bool:
-    """Whether three times as many pairs more would cost too much."""
+    """True if three times as many additional pairs would cost too much."""
     last = ladder.settings[-1]
     more = 3.0 * members * 1.5 * pilot.runs.cost(last, pilot.grid(last))
     return (pilot.runs.counted + more > pilot.most_seconds(ladder.settings[-2], pilot.first)
@@ -350,7 +350,7 @@ def _too_dear(pilot: Pilot, ladder: Ladder, members: int) -> bool:
 
 
 def _ended(pilot: Pilot, ladder: Ladder) -> str:
-    """Why no finer step is run; "" to go on."""
+    """Reason why no finer step is run; "" to continue."""
     halvings, error = ladder.halvings, pilot.asked(pilot.solved(ladder.settings[-1], pilot.first))
     if len(halvings) > 1 and all(each.apart for each in halvings[-2:]):
         return "apart"
@@ -367,7 +367,7 @@ def _ended(pilot: Pilot, ladder: Ladder) -> str:
 
 
 def observed(pilot: Pilot, top: Setting, coarser: Sequence[Setting], members: int) -> Observed:
-    """Observations of several settings: all of the same members, noise drawn at the step of the top one."""
+    """Observations of several settings, with the same members, and noise drawn at the step of the top setting."""
     settings, grid = [top, *coarser], pilot.grid(top)
     y = [pilot.y(setting, grid, members) for setting in settings]
     kept = [i for i, values in enumerate(y) if not np.isnan(values).any()]
@@ -398,7 +398,7 @@ def observed(pilot: Pilot, top: Setting, coarser: Sequence[Setting], members: in
 
 
 def failing(setting: Setting, y: np.ndarray) -> SceneError:
-    """The refusal of a statistic of members that fail at the finest step."""
+    """Error for a statistic whose members fail at the finest step."""
     count = int(np.isnan(y).sum())
     problem = f"{count} of {len(y)} members fail, or have no finite number"
     return refusal("setting", str(setting), problem, "fix the failing members (lw.solve says which), or vary less")

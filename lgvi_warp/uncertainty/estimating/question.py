@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The question that a statistic, a text or a quantity asks: a number of each member, and what is estimated of these."""
+"""The question of an estimate: a number of each member, and the statistic of these numbers."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ REMEDY = ('give "mean position[0]", "depth above 3", "outcome floor", lw.statist
 class Question:
     """Question of an estimate: a target of one number of each member.
 
-    label: of the answer, as "mean position[0]".
-    of: a quantity of interest; None where a metric gives the number.
-    metric: the statistic that gathers the number of each member; None where a quantity gives it.
+    label: label of the answer, such as "mean position[0]".
+    of: a quantity of interest; None if a metric gives the number.
+    metric: the statistic that computes the number of each member; None if a quantity gives it.
     """
 
     label: str
@@ -43,7 +43,7 @@ class Question:
     metric: Statistic | None = None
 
     def settings(self, scene: SceneLike) -> dict[str, Any]:
-        """Arguments of `lw.prepare` that the question needs in a scene."""
+        """Arguments of `lw.prepare` that the question needs for a scene."""
         if self.metric is None:
             return {"of": self.of, "failed": "nan"}
         every = scene.run.save_every
@@ -55,7 +55,7 @@ class Question:
         return {"statistics": [self.metric], "save": SaveAt(every=every, fields=("position",))}
 
     def numbers(self, answer: Any) -> np.ndarray:
-        """The number of each member (n,) from what a prepared run returned; NaN for those that failed."""
+        """The number of each member (n,) from the answer of a prepared run; NaN for members that failed."""
         if self.metric is None:
             y = np.asarray(answer, dtype=np.float64)
         else:
@@ -67,9 +67,9 @@ class Question:
 
 
 def question_of(of: Any, risk: Any = "mean") -> Question:
-    """Read what is asked; SceneError where it is no mean, probability, quantile or mean of a part of one number.
+    """Read a question; SceneError unless it is a mean, probability, quantile or cvar of one number.
 
-    risk: "mean", the level of a quantile, or a CVaR, of a quantity or a metric.
+    risk: "mean", the level of a quantile, or a CVaR; for a quantity or a metric.
     """
     question = _read(of)
     if isinstance(risk, str) and risk == "mean":
@@ -80,7 +80,7 @@ def question_of(of: Any, risk: Any = "mean") -> Question:
 
 
 def with_risk(question: Question, risk: Any) -> Question:
-    """The same number of each member, of which a quantile or the mean of the worst part is asked."""
+    """The same number of each member, with a quantile or the mean of the worst members as statistic."""
     inner = question.label.removeprefix("mean ")
     if isinstance(risk, CVaR):
         target = Sought("cvar", risk.share) if risk.share < 1.0 else Sought()
@@ -127,7 +127,7 @@ def _of_text(text: str) -> Question:
 
 
 def _of_quantity(of: Any) -> Question:
-    """The mean of a quantity of interest; of an outcome its probability."""
+    """The mean of a quantity of interest; for an outcome, its probability."""
     (interest,) = quantities(of)
     kind = getattr(interest, "kind", "")
     if kind == "outcome":
@@ -139,7 +139,7 @@ def _of_quantity(of: Any) -> Question:
 
 
 def _of_statistic(statistic: Statistic) -> Question:
-    """The question that a statistic asks; SceneError where it is of another kind, or of some of the members alone."""
+    """The question of a statistic; SceneError if it has another kind, or is taken only over some members."""
     if statistic.at is not None or (statistic.stopped == "left_out" and not statistic.ticks):
         problem = "is of some of the members alone, whose number is not fixed"
         raise refusal("of", statistic.key, problem, "ask for all of them, or run lw.solve(statistics=[...])")
@@ -163,7 +163,7 @@ def _of_statistic(statistic: Statistic) -> Question:
 
 
 def _only(statistic: MemberStatistic) -> Statistic:
-    """Statistic of the number of each member."""
+    """The statistic that computes the number of each member."""
     if len(statistic.then) != 1:
         raise refusal(
             f"{statistic.type}.then", len(statistic.then), "statistics are asked for", "ask for one at a time"
@@ -172,7 +172,7 @@ def _only(statistic: MemberStatistic) -> Statistic:
 
 
 def _asked_of(question: Question, statistic: Statistic) -> Question:
-    """Question that a statistic asks of a number."""
+    """The question of a statistic about a number."""
     if isinstance(statistic, statistics.Quantiles):
         if len(statistic.levels) != 1:
             raise refusal("of", statistic.levels, "are several levels", "ask for one: levels=[0.95]")
@@ -186,7 +186,7 @@ def _asked_of(question: Question, statistic: Statistic) -> Question:
 
 
 def _bounded(question: Question, above: float | None = None, below: float | None = None) -> Question:
-    """The probability that a number is within limits; of a condition without limits that it is true."""
+    """The probability that a number is within limits; for a condition without limits, that it is true."""
     inner = question.label.removeprefix("mean ")
     limits = "".join(f" {word} {spelled(v)}" for word, v in (("above", above), ("below", below)) if v is not None)
     if not limits:
@@ -196,7 +196,7 @@ def _bounded(question: Question, above: float | None = None, below: float | None
 
 
 def _of_passage(statistic: statistics.FirstPassage) -> Question:
-    """The probability to have passed a limit by the end, as the samples show it: that the extreme is beyond it."""
+    """The probability of passing a limit by the end: that the extreme of the samples is beyond the limit."""
     above, below = statistic.above, statistic.below
     if not isinstance(statistic.of, str) or (above is None) == (below is None):
         remedy = "give the name of a quantity and one limit, or an event of the scene and lw.statistics.Outcome"

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Target of an estimate over the members' numbers: a mean, a probability, a quantile or the mean of the worst part.
+"""Target of an estimate over the members' numbers: a mean, a probability, a quantile or a cvar.
 
-Levels give signed samples: E g(Y) is the sum of weights times means of g over arrays of members. A quantile and the mean of a
-part are solved for from such sums, and their errors are those of the mean of what each member contributes.
+Levels give signed samples: E g(Y) is the sum of weights times means of g over arrays of members. Quantiles and cvars
+are solved for from such sums. Their errors are the errors of the mean of the members' contributions.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ HALVINGS = 60
 
 @dataclass(frozen=True)
 class Solved:
-    """A target's value, the threshold it is about, and the density there; of means and probabilities the value alone."""
+    """A target's value, its threshold, and the density there; for means and probabilities only the value."""
 
     value: float
     threshold: float = 0.0
@@ -31,10 +31,10 @@ class Solved:
 
 @dataclass(frozen=True)
 class Sought:
-    """A mean ("mean"), a probability ("probability"), a "quantile" of a level, or the mean of the worst part, a "cvar".
+    """A mean ("mean"), a probability ("probability"), a "quantile", or the mean of the worst members, a "cvar".
 
-    level: of the quantile, or the part.
-    above, below: a probability's limits; without any the numbers are 1 or 0 themselves.
+    level: level of the quantile, or fraction of the cvar.
+    above, below: a probability's limits; without limits the numbers are 1 or 0 themselves.
     """
 
     kind: str = "mean"
@@ -43,7 +43,7 @@ class Sought:
     below: float | None = None
 
     def solved(self, samples: Sequence[Weighted]) -> Solved:
-        """The value from weighted samples, whose weights have the sum 1. docs/theory/estimators.md, (E11)."""
+        """The value from weighted samples, whose weights sum to 1. docs/theory/estimators.md, (E11)."""
         if self.kind in ("mean", "probability"):
             return Solved(mean_of(samples, self.counted))
         level = self.level if self.kind == "quantile" else 1.0 - self.level
@@ -54,7 +54,7 @@ class Sought:
         return Solved(threshold + beyond / self.level, threshold)
 
     def contributions(self, y: np.ndarray, at: Solved) -> np.ndarray:
-        """Contribution of each member (n,): their mean is the value, to first order.
+        """Contribution of each member (n,); to first order, the mean of the contributions is the value.
 
         docs/theory/estimators.md, (E12).
         """
@@ -65,7 +65,7 @@ class Sought:
         return self.counted(y)
 
     def counted(self, y: np.ndarray) -> np.ndarray:
-        """The numbers themselves; of a condition 1 where it holds and 0 where not."""
+        """The numbers themselves; for a condition, 1 if it holds and 0 if not."""
         if self.above is None and self.below is None:
             return y
         holds = np.ones(y.shape, bool) if self.above is None else y > self.above
@@ -74,25 +74,25 @@ class Sought:
 
     @property
     def unbounded(self) -> bool:
-        """Whether one member may change the value by any amount, as it may change a mean."""
+        """True if one member can change the value by any amount, as for a mean."""
         return self.kind in ("mean", "cvar")
 
     @property
     def tail(self) -> float:
-        """The part of the members that tells the value: 1, but of a quantile the nearer tail, of a cvar a fourth of it."""
+        """Fraction of members that decides the value: 1; of a quantile the nearer tail; of a cvar a fourth of its level."""
         # Numbers in a tail are skewed: of a mean of the worst members four times as many are needed.
         return {"quantile": min(self.level, 1.0 - self.level), "cvar": 0.25 * self.level}.get(self.kind, 1.0)
 
     @property
     def smooth(self) -> bool:
-        """Whether contributions jump where a number passes a threshold, and may be smoothed to see small changes of it."""
+        """True if contributions jump at a threshold, and may be smoothed to show small changes of the number."""
         return self.kind == "quantile" or self.above is not None or self.below is not None
 
     def smoothed(self, y: np.ndarray, at: Solved, width: float) -> np.ndarray:
-        """Contributions whose jumps are smoothed over a width, for differences: how much probability small changes move.
+        """Contributions with jumps smoothed over a width, so that differences show the effect of small changes.
 
-        The change of a probability is the density at the threshold times the change of the number; over a width the density
-        is averaged, while of a few members none may jump.
+        The change of a probability is the density at the threshold times the change of the number. Smoothing averages
+        the density over a width; without it, perhaps none of a few members would jump.
         """
         from scipy.special import ndtr
 
@@ -105,7 +105,7 @@ class Sought:
         return whole if self.below is None else whole - beyond(self.below)
 
     def least(self, at: Solved) -> float:
-        """The smallest change of a contribution: 0 where contributions are continuous."""
+        """The smallest change of a contribution; 0 if contributions are continuous."""
         return 1.0 if self.kind == "probability" else 1.0 / at.density if self.kind == "quantile" else 0.0
 
 
@@ -115,7 +115,7 @@ def mean_of(samples: Sequence[Weighted], of: Callable[[np.ndarray], np.ndarray])
 
 
 def quantile_of(samples: Sequence[Weighted], level: float) -> float:
-    """Quantile of the weighted distribution at a level: it may fall a little between levels of signed weights."""
+    """Quantile of the weighted distribution; with signed weights it may decrease slightly between levels."""
     values = np.concatenate([y for _, y in samples])
     low, high = float(values.min()), float(values.max())
     for _ in range(HALVINGS):
@@ -126,7 +126,7 @@ def quantile_of(samples: Sequence[Weighted], level: float) -> float:
 
 
 def density_of(samples: Sequence[Weighted], level: float) -> float:
-    """The density at the quantile of a level, from the quantiles a part of the nearer tail on both sides.
+    """The density at the quantile of a level, from quantiles on both sides at a fraction of the nearer tail.
 
     docs/theory/estimators.md, (E12).
     """

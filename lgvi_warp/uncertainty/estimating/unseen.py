@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Members that a few others do not show: branches of a Choice as strata, and probes far from the middle."""
+"""Members that a small sample may miss: branches of a Choice as strata, and probes far from the middle."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ MOST_AXES, DIRECTIONS = 64, 32
 
 @dataclass(frozen=True, eq=False)
 class Stratum:
-    """A part of the cube: its probability, and by column the first ends and the widths (k,) of the intervals it has."""
+    """A part of the cube: its probability, and for each column the starts and widths (k,) of its intervals."""
 
     probability: float = 1.0
     columns: Mapping[int, tuple[np.ndarray, np.ndarray]] | None = None
@@ -45,7 +45,7 @@ class Stratum:
 
 
 def strata_of(fleet: Ensemble) -> list[Stratum]:
-    """The common part of the cube first; then one stratum for each rare branch of a Choice, the others before it common.
+    """The common part of the cube, then one stratum for each rare branch of a Choice, with earlier Choices common.
 
     docs/theory/estimators.md, (E26).
     """
@@ -70,7 +70,7 @@ def strata_of(fleet: Ensemble) -> list[Stratum]:
 
 
 def branches(law: Choice) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The interval of levels of each value of a Choice, as starts and widths (k,), and which values are the same (k,)."""
+    """The interval of levels of each value of a Choice, as starts and widths (k,), and groups of equal values (k,)."""
     values = floats(law.values)
     weights = np.ones(len(values)) if law.weights is None else floats(law.weights)
     ends = np.cumsum(weights) / weights.sum()
@@ -79,7 +79,7 @@ def branches(law: Choice) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def probes(seed: int, normals: np.ndarray, far: float = FAR[0]) -> np.ndarray:
-    """Members (m, d) of a pilot's normals (n, d), each moved so far out along one axis or direction, to either side."""
+    """Members (m, d) from a pilot's normals (n, d), each moved to the distance `far` on one axis or direction."""
     d, random = normals.shape[1], generator(seed, "estimate probes")
     axes = np.eye(d)[:MOST_AXES]
     drawn = random.standard_normal((DIRECTIONS if d > 1 else 0, d))
@@ -90,7 +90,7 @@ def probes(seed: int, normals: np.ndarray, far: float = FAR[0]) -> np.ndarray:
 
 
 def reach_of(y: np.ndarray, normals: np.ndarray, far: np.ndarray, far_normals: np.ndarray) -> float:
-    """The largest distance of probes' numbers (m,) from what members (n,) let expect of them by regression.
+    """The largest distance of probes' numbers (m,) from a regression on the members (n,).
 
     docs/theory/estimators.md, (E25).
     """

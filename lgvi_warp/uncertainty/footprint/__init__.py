@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Footprint: the smallest regions that hold given shares of the members' places."""
+"""Footprint: the smallest regions that contain given shares of the members' positions."""

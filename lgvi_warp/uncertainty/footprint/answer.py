@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The answer to where members are: regions, centre and spread of their places on the map."""
+"""Answer of `footprint`: regions, centre and covariance of the members' positions on the map."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from lgvi_warp.uncertainty.footprint.density import MAIN, Polygon, enclosed
 
 @dataclass(frozen=True, eq=False)
 class Region:
-    """The smallest region that holds a share of the members, with the circle and the ellipse of the same share.
+    """The smallest region that contains a share of the members, with the circle and the ellipse of the same share.
 
     Attributes:
         share: Share of the members.
-        area: Area [m2]; NaN of places at one point or on a line.
-        low, high: Its 95 % interval [m2]; high is infinite where the members are too few to bound it.
-        radius: Radius of the circle about the centre that holds the share [m].
-        ellipse_area: Area of the ellipse that would hold it, if the places were normally distributed [m2].
-        polygons: Its parts. Each is a tuple of rings (k, 2), north and east [m]: the outer one, then those of its holes.
+        area: Area [m2]; NaN if all positions are at one point or on a line.
+        low, high: 95 % interval of the area [m2]; high is infinite if the members are too few to bound it.
+        radius: Radius of the circle about the centre that contains the share [m].
+        ellipse_area: Area of the ellipse that would contain the share if the positions were normally distributed [m2].
+        polygons: Parts of the region. Each is a tuple of rings (k, 2), north and east [m]: the outline, then its holes.
     """
 
     share: float
@@ -38,22 +38,22 @@ class Region:
 
     @property
     def percent(self) -> str:
-        """The share in percent, as "95 %"."""
+        """Text of the share in percent, such as "95 %"."""
         return f"{100.0 * self.share:g} %"
 
     @property
     def area_text(self) -> str:
-        """The area with its interval in words, as "112 m2 (107 to 118)"."""
+        """Text of the area with its interval, such as "112 m2 (107 to 118)"."""
         return _area_text(self.area, self.low, self.high)
 
     @property
     def scattered(self) -> bool:
-        """Several parts, for which the circle is far too large."""
+        """True if the region has several parts and the circle is much too large."""
         return len(self.polygons) > 1 and math.pi * self.radius**2 > WIDE * self.area
 
     @property
     def largest(self) -> tuple[np.ndarray, float]:
-        """Centroid (2,) of the outline of the largest part, and the radius about it that holds this part [m]."""
+        """Centroid (2,) of the outline of the largest part, and the radius about it that contains this part [m]."""
         ring = max(self.polygons, key=lambda rings: enclosed([rings]))[0]
         away = ring - ring[0]
         parts = away[:-1, 1] * away[1:, 0] - away[1:, 1] * away[:-1, 0]
@@ -63,19 +63,19 @@ class Region:
 
 @dataclass(frozen=True, eq=False)
 class Footprint(Saved):
-    """Places of the members on the map, made by `lw.studies.footprint`.
+    """Positions of the members on the map, made by `lw.studies.footprint`.
 
     Attributes:
-        at: "end", the name of an event or outcome, as "floor", or a time [s] as text.
-        members: Number of members that have such a place.
-        lacking: Number of members that have none, by outcome, as {"ok": 700, "non_finite": 3}.
-        centre: Mean of the places (2,), north and east of the origin [m]. Up to 5 % of the members that lie far away are left
-            out, and counted in a message.
+        at: "end", the name of an event or outcome, such as "floor", or a time [s] as text.
+        members: Number of members that have such a position.
+        lacking: Number of members without such a position, by outcome, such as {"ok": 700, "non_finite": 3}.
+        centre: Mean of the positions (2,), north and east of the origin [m]. Up to 5 % of the members may be left out
+            because they are far away; a message counts them.
         covariance: Covariance of the same members (2, 2) [m2].
-        regions: The regions of 50, 90, 95 and 99 %, as far as the members suffice for them.
-        growth: For an eighth, a quarter, half and all of the members: number, area of the 95 % region and its interval [m2].
-        origin: Latitude and longitude of the axes' origin [deg]; None where the scene has none.
-        places: North and east of members (m, 2) [m], for pictures: of more than 1,000 a part.
+        regions: The regions of 50, 90, 95 and 99 %, if there are enough members for them.
+        growth: For an eighth, a quarter, half and all of the members: number, area of the 95 % region and interval [m2].
+        origin: Latitude and longitude of the axes' origin [deg]; None if the scene has none.
+        places: North and east of members (m, 2) [m], for figures; a subset if there are more than 1,000 members.
         messages: Notes for the user.
         provenance: Scene, ensemble, settings, versions and machine of the run.
     """
@@ -97,7 +97,7 @@ class Footprint(Saved):
 
     @property
     def main(self) -> Region:
-        """The region that the answer is about: that of 95 %, or the largest that the members suffice for."""
+        """The region of the answer: the 95 % region, or the largest region for which there are enough members."""
         return max((region for region in self.regions if region.share <= MAIN), key=lambda region: region.share)
 
     @property
@@ -167,7 +167,7 @@ WIDE = 2.0
 
 
 def _region(entry: Mapping[str, Any]) -> Region:
-    """A region of a JSON file: without an area one of a point or a line."""
+    """Read a region from a JSON file; without an area it is a point or a line."""
     polygons = tuple(tuple(np.array(ring, np.float64) for ring in rings) for rings in entry["polygons"])
     missing = math.nan if entry["low"] is None else math.inf
     numbers = {name: with_missing_as(entry[name], missing) for name in ("area", "low", "high")}
@@ -183,7 +183,7 @@ def time_of(at: str) -> float | None:
 
 
 def _area_text(area: float, low: float, high: float) -> str:
-    """An area with its interval in words."""
+    """Text of an area with its interval."""
     if math.isnan(area):
         return "no area"
     if not math.isfinite(area):
@@ -195,13 +195,13 @@ def _area_text(area: float, low: float, high: float) -> str:
 
 
 def number_text(value: float, scale: float) -> str:
-    """A number to three digits of a scale, or more, without an exponent."""
+    """Text of a number, without an exponent, to three digits of a scale or more."""
     digits = 2 - math.floor(math.log10(scale)) if 0.0 < scale < math.inf else 2
     return f"{value:,.{max(0, digits)}f}"
 
 
 def place_text(place: Sequence[float] | np.ndarray, scale: float) -> str:
-    """A place, north and east [m], in words, to three digits of a scale."""
+    """Text of a position, north and east [m], to three digits of a scale."""
     words = []
     for value, names in zip(place, (("north", "south"), ("east", "west")), strict=True):
         text = number_text(abs(float(value)), scale)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Smallest regions that hold given shares of places: level sets of a kernel density on a grid.
+"""Smallest regions that contain given shares of positions: level sets of a kernel density on a grid.
 
-The density at a member leaves out its own kernel, and the level of a region is a quantile of these densities. So the region
-holds its share of new members, whatever the bandwidth (Lei, Robins & Wasserman 2013, Distribution-free prediction sets,
-Journal of the American Statistical Association 108). Of several bandwidths each share takes the one of the smallest area.
+The density at a member leaves out its own kernel, and the level of a region is a quantile of these densities. So the
+region contains its share of new members with any bandwidth (Lei, Robins & Wasserman 2013, Distribution-free prediction
+sets, Journal of the American Statistical Association 108). Each share uses the bandwidth with the smallest area.
 """
 
 from __future__ import annotations
@@ -59,9 +59,9 @@ class Outline(NamedTuple):
 
 
 class Whitening:
-    """Coordinates in which a covariance is one and wide gaps between clusters, which have no density, are cut short.
+    """Coordinates in which a covariance is the identity, and wide gaps without density between clusters are shortened.
 
-    So a kernel is as long and as oblique as a cluster, and clusters far apart fit on one grid.
+    So kernels have the shape of a cluster, and clusters far apart fit on one grid.
     """
 
     def __init__(self, places: np.ndarray, covariance: np.ndarray, widest: float):
@@ -91,9 +91,9 @@ class Whitening:
 
 
 class DensityGrid:
-    """Members (n, 2) [m] binned on a square grid in a frame; coordinates are counted in cells.
+    """Members (n, 2) [m] binned on a square grid in the frame's coordinates, which are counted in cells.
 
-    like: A grid of the same frame and cells; default None, one that holds all but the outermost members.
+    like: A grid whose frame and cells are used; default None makes a grid that contains all but the outermost members.
     """
 
     def __init__(
@@ -140,7 +140,7 @@ class DensityGrid:
 
 
 class Smoothed(NamedTuple):
-    """Density on a grid; densities at the members without their own kernels, rising, and the shares of members up to them."""
+    """Density on a grid; densities at members without their own kernels, rising, and cumulative shares of members."""
 
     grid: DensityGrid
     h: float
@@ -149,17 +149,17 @@ class Smoothed(NamedTuple):
     others: np.ndarray
 
     def level(self, outside: float) -> float:
-        """Find the density above which all but a share of new members lie; 0 where that cannot be told."""
+        """Find the density above which all but a share of new members lie; 0 if it cannot be determined."""
         found = float(np.interp(outside, self.shares, self.others, left=0.0, right=np.inf))
         return found if found > LEAST_LEVEL * self.density.max() else 0.0
 
     def cells(self, share: float) -> float:
-        """Count the cells of a share's region; infinite where it cannot be told."""
+        """Count the cells of a share's region; infinite if it cannot be determined."""
         level = self.level(1.0 - share)
         return float(np.count_nonzero(self.density >= level)) if level else np.inf
 
     def within(self, share: float, places: np.ndarray) -> np.ndarray | None:
-        """Pool the covariance (2, 2) [m2] of members (n, 2) [m] within the parts of a share's region; None of one part."""
+        """Pool the covariance (2, 2) [m2] of members (n, 2) [m] within the parts of a share's region; None if it is one."""
         from scipy.ndimage import label
 
         grid = self.grid
@@ -176,7 +176,7 @@ class Smoothed(NamedTuple):
         return np.asarray((away[some].T * weights[some]) @ away[some] / weights[some].sum())
 
     def region(self, share: float) -> Outline:
-        """Trace a share's region, with the interval that order statistics of the densities give its level."""
+        """Trace a share's region, with an interval of its area from order statistics of the densities."""
         from scipy.stats import binom
 
         count = round(self.grid.count)
@@ -193,7 +193,7 @@ class Smoothed(NamedTuple):
         return Outline(area, low, high, tuple(polygons))
 
     def parts(self, level: float) -> list[list[np.ndarray]] | None:
-        """Trace where the density is above a level: the rings of each part, in cells; None where it cannot be told."""
+        """Trace the region of densities above a level: rings of each part, in cells; None if this is impossible."""
         try:
             from contourpy import FillType, contour_generator
         except ImportError as error:
@@ -210,7 +210,7 @@ class Smoothed(NamedTuple):
 
 
 def enclosed(polygons: Iterable[Iterable[np.ndarray]]) -> float:
-    """Sum the areas of polygons: rings of holes run the other way round."""
+    """Sum the areas of polygons; rings of holes have the opposite orientation."""
     rings = (ring - ring[0] for polygon in polygons for ring in polygon)
     return sum(0.5 * float(np.sum(r[:-1, 1] * r[1:, 0] - r[1:, 1] * r[:-1, 0])) for r in rings)
 
@@ -218,11 +218,11 @@ def enclosed(polygons: Iterable[Iterable[np.ndarray]]) -> float:
 def regions(
     places: np.ndarray, weights: np.ndarray, covariance: np.ndarray, shares: Sequence[float], growing: float
 ) -> tuple[list[Outline], dict[int, Outline], bool]:
-    """Find the regions of shares that the members suffice for.
+    """Find the regions of the shares for which there are enough members.
 
-    places: North and east (n, 2) [m], not all on a line. weights: (n,). growing: One of the shares.
-    covariance: Of the members (2, 2) [m2], without those far away.
-    Returns: The regions; by number of members the region of the share `growing`; whether the grid resolves all clusters.
+    places: North and east (n, 2) [m], not all on a line. weights: (n,). growing: The share whose growth is computed.
+    covariance: Covariance of the members (2, 2) [m2], without those far away.
+    Returns: The regions; number of members -> region of the share `growing`; True if the grid resolves all clusters.
     """
     scott, least = COARSEST * effective(weights) ** (-1.0 / 6.0), POINT**2 * np.trace(covariance)
     quarters = np.quantile(Whitening(places, covariance, math.inf).of(places), [0.25, 0.75], axis=0)
@@ -266,25 +266,25 @@ def regions(
 
 
 def moments(places: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Mean (2,) and unbiased covariance (2, 2) of places."""
+    """Mean (2,) and unbiased covariance (2, 2) of positions."""
     centre, count = np.average(places, axis=0, weights=weights), effective(weights)
     away = places - centre
     return centre, (away.T * weights) @ away / weights.sum() * (count / max(count - 1.0, 1.0))
 
 
 def spread(covariance: np.ndarray) -> tuple[float, float]:
-    """Standard deviations along and across a cloud of places."""
+    """Standard deviations of a cloud of positions along its major and minor axes."""
     across, along = np.sqrt(np.maximum(np.linalg.eigvalsh(covariance), 0.0)).tolist()
     return along, across
 
 
 def near(places: np.ndarray, weights: np.ndarray, least: float) -> np.ndarray:
-    """Mask (n,) of the members that are not far from the middle ones; all where these are on a line, or too few.
+    """Mask (n,) of the members that are not far from the middle ones; all if these are on a line or too few.
 
-    The middle ones minimise the determinant of their covariance (concentration steps of Rousseeuw & Van Driessen 1999, A fast
-    algorithm for the minimum covariance determinant estimator, Technometrics 41).
+    The middle members minimise the determinant of their covariance (concentration steps of Rousseeuw & Van Driessen
+    1999, A fast algorithm for the minimum covariance determinant estimator, Technometrics 41).
 
-    least: A smaller spread is round-off [m].
+    least: A smaller spread counts as round-off [m].
     """
     everyone = np.ones(len(places), bool)
     some = slice(None, None, -(-len(places) // ENOUGH))
@@ -310,15 +310,15 @@ def near(places: np.ndarray, weights: np.ndarray, least: float) -> np.ndarray:
 
 
 def _squared(away: np.ndarray, inverse: np.ndarray) -> np.ndarray:
-    """Squared distances (n,) in terms of a covariance."""
+    """Squared Mahalanobis distances (n,)."""
     return np.einsum("ij,ij->i", away @ inverse, away)
 
 
 def effective(weights: np.ndarray) -> float:
-    """Count members of equal weight that tell as much as members of these weights (Kish 1965, Survey sampling)."""
+    """Effective sample size: equivalent number of equally weighted members (Kish 1965, Survey sampling)."""
     return float(weights.sum() ** 2 / (weights**2).sum())
 
 
 def least_members(share: float) -> int:
-    """Count the members from which on a region can hold this share of new ones: one of them lies outside."""
+    """Fewest members for which a region can contain this share of new ones: one of them lies outside."""
     return math.ceil(round(1.0 / (1.0 - share) - 1.0, 9))

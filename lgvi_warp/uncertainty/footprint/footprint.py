@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Footprint of a run: where its members are at the end, at an event, or at a time."""
+"""Footprint of a run: positions of its members at the end, at an event, or at a time."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ ROUND_OFF = 16.0
 
 
 def run_answer(result: Result) -> str:
-    """Sentence on how the members of a run ended, and where."""
+    """Sentence on the outcomes and the final positions of the members of a run."""
     how = answer_of(result)
     if result.members < least_members(MAIN):
         return how
@@ -59,22 +59,22 @@ def run_answer(result: Result) -> str:
 
 
 def footprint(result: Result, at: str | float = "end") -> Footprint:
-    """Find the smallest regions that hold given shares of the members' places, and their areas.
+    """Find the smallest regions that contain given shares of the members' positions, and their areas.
 
-    The shares are 50, 90, 95 and 99 %. The regions are level sets of a kernel density, at the levels above which these shares
-    of new members would lie. So they may have several parts and holes. Members that failed have no end, and some members
-    may never reach the event: these have no place, and are counted in `lacking`.
+    The shares are 50, 90, 95 and 99 %. The regions are level sets of a kernel density, at the levels above which these
+    shares of new members would lie. So they may have several parts and holes. Members that failed or never reach the
+    event have no position; `lacking` of the answer counts them.
 
     Args:
         result: A result with positions, in memory or in a store.
-        at: "end"; the name of an event or outcome, as "floor", for the place where it stopped members; or the time of a
-            sample [s].
+        at: "end"; the name of an event or outcome, such as "floor", for the positions where it stopped members; or a
+            sample time [s].
 
     Returns:
         Regions, centre, covariance, and the answer in one sentence.
 
     Raises:
-        SceneError: Positions were not kept, no sample has this time, or no member has such a place.
+        SceneError: Positions were not saved, no sample has this time, or no member has such a position.
         MissingExtra: contourpy is not installed (extra: viz).
 
     Examples:
@@ -90,7 +90,7 @@ def footprint(result: Result, at: str | float = "end") -> Footprint:
 
 
 def _footprint(result: Result, at: str | float, outlined: bool = True) -> Footprint:
-    """The footprint; without outlines it has circles and ellipses alone, and needs no contourpy."""
+    """Compute the footprint; without outlines it has only circles and ellipses, and needs no contourpy."""
     word = at.strip() if isinstance(at, str) else str(at) if isinstance(at, Real) else ""
     word = word if (when := time_of(word)) is None else f"{when:.12g}"
     positions, there = _positions(result, word, at)
@@ -186,7 +186,7 @@ def _positions(result: Result, word: str, at: Any) -> tuple[np.ndarray, np.ndarr
 
 
 def _row(result: Result, row: int) -> np.ndarray:
-    """Positions of all members (n, 3) at one sample; of a store only the chunks that hold it are read, one after another."""
+    """Positions of all members (n, 3) at one sample; from a store, only its chunks are read, one after another."""
     if "position" in result.samples:
         if result.store is None:
             return np.asarray(result.samples["position"][row])

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Events too rare to see by plain sampling: chains of members, and weights from those that fail."""
+"""Events too rare for plain sampling: subset simulation by chains, and importance sampling."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Answer of `rare_event`: a probability with its error, its cost, and the members for which the event happens."""
+"""Answer of `rare_event`: a probability with its error and cost, and the members for which the event happens."""
 
 from __future__ import annotations
 
@@ -31,41 +31,41 @@ class RareEvent(Saved):
     """The probability of a rare event, and members for which it happens.
 
     Attributes:
-        event: what was asked for, in words.
-        probability: of the event; members that fail count as it, where failed="event".
-        interval: (lower, upper), of 95 % by Student's t of the logarithm.
+        event: text of the event.
+        probability: probability of the event; with failed="event", members that fail count as the event.
+        interval: (lower, upper), 95 % interval by Student's t for the logarithm.
         relative_error: relative standard error of the probability.
         estimator: "importance", "subset", "plain" or "splitting".
-        members: number of members that were run, by setting: "scene", and what `cheaper` says; with splitting in whole runs.
-        failing: the members for which the event happens, a `Table` for lw.Ensemble(scene, sampling=found.failing); None where
-            noise alone varies. With splitting one may come several times, with other noise.
-        normals: (m, d), the numbers that vary of these members as standard normals, in the order of `moved`.
-        draws: (m, k), standard normals of noise of these members, for lw.prepare(..., draws="given"); k = 0 without noise, and
-            with splitting.
-        weights: (m,), weights of these members, with the sum 1.
-        failed_share: part of the probability that is of members that failed, or have a number that is not finite.
-        likeliest: values by name of the likeliest of these members, that with the least distance from the middle.
-        likeliest_draws: (k,), standard normals of its noise.
-        distance: its distance from the middle, in standard deviations of all that varies.
-        moved: by name, the mean of the failing members in standard deviations from the middle.
-        noise_moved: by term or sensor, a z-score of the failing members' draws: of their mean path or of their sum of squares.
-            For noise that does not matter it is roughly a standard normal number; from 4.5 on it is not by chance.
-        runs: the runs of subset simulation: thresholds and limits of each level. With splitting, scores take their place: the
+        members: number of members run, by setting: "scene" and the entries of `cheaper`; with splitting, in whole runs.
+        failing: the members for which the event happens, a `Table` for lw.Ensemble(scene, sampling=found.failing); None
+            if only noise varies. With splitting a member may occur several times, with different noise.
+        normals: (m, d), the varied numbers of the failing members as standard normals, in the order of `moved`.
+        draws: (m, k), normals of the failing members' noise, for lw.prepare(..., draws="given"); k = 0 without noise
+            and with splitting.
+        weights: (m,), weights of the failing members, with the sum 1.
+        failed_share: fraction of the probability from members that failed, or have a number that is not finite.
+        likeliest: values by name of the likeliest failing member, which has the smallest distance from the middle.
+        likeliest_draws: (k,), standard normals of this member's noise.
+        distance: this member's distance from the middle, in standard deviations of all varied numbers.
+        moved: name -> mean of the failing members, in standard deviations from the middle.
+        noise_moved: term or sensor -> z-score of the failing members' draws: of their mean path or of their sum of squares.
+            For noise that does not matter it is roughly a standard normal number; from 4.5 on, it is significant.
+        runs: the runs of subset simulation: thresholds and limits of each level. With splitting, these are scores: the
             expected limit at the end divided by its uncertainty; infinite if the event happened.
-        plain_members: members that plain Monte Carlo would take for this error.
-        plain_seconds: how long these would take at the pace of this call [s].
-        seconds: how long the runs of members took [s].
+        plain_members: number of members that plain Monte Carlo would need for this error.
+        plain_seconds: time that these members would take at the speed of this call [s].
+        seconds: time of the runs of members [s].
         messages: notes for the user.
-        provenance: scene, what varies, settings, versions and machine.
-        paths: with splitting, for each of the failing members (times (k + 1,) [s], indices (k,)): from one time to the next it
-            has the noise of an index, by the seed of the call, as in `run.states(final, indices=, seed=)`.
-        moved_size: by name, the mean absolute value of the failing members in standard deviations; 0.80 of all members.
-        moved_spread: by name, the standard deviation of the failing members in that of all members.
-        moved_z: by name, the z-score farthest from 0 of these three against all members; from 4.5 on it is not by chance.
-        by_condition: where the event is any of several conditions, (probability, lower, upper) of each alone by its words, and
-            of "any" and "all" of them, over the whole run; empty otherwise, and where a status is among them.
-        ancestors: (m,), for each failing member its ancestor in the first level; with splitting, its run. Members of one
-            ancestor are related.
+        provenance: scene, distributions, settings, versions and machine.
+        paths: with splitting, (times (k + 1,) [s], indices (k,)) of each failing member: between two successive times
+            it has the noise of this index, with the seed of the call, as in `run.states(final, indices=, seed=)`.
+        moved_size: name -> mean absolute value of the failing members, in standard deviations; for all members it is 0.80.
+        moved_spread: name -> standard deviation of the failing members divided by that of all members.
+        moved_z: name -> z-score farthest from 0 of these three differences from all members; significant from 4.5 on.
+        by_condition: if the event is any of several conditions, text of a condition -> (probability, lower, upper) of this
+            condition alone, and of "any" and "all" of them, over the whole run; otherwise, or with a status, empty.
+        ancestors: (m,), ancestor of each failing member in the first level, or its run with splitting. Members with the
+            same ancestor are related.
     """
 
     study: ClassVar[str] = "rare"
@@ -111,7 +111,7 @@ class RareEvent(Saved):
         return f"{found}; in failing members {listed(self._moved() or ['nothing differs beyond chance'], 1)}."
 
     def _moved(self) -> list[str]:
-        """Differences of the failing members from all in words, the clearest first."""
+        """Texts of the differences between failing and all members, the clearest first."""
         columns = [each.values() for each in (self.moved, self.moved_size, self.moved_spread, self.moved_z)]
         moved = dict(zip(self.moved, zip(*columns, strict=False), strict=False))
         laws = self.provenance.get("ensemble", {}).get("vary", {})
@@ -173,7 +173,7 @@ class RareEvent(Saved):
 
 
 def _run_of(content: Mapping[str, Any]) -> SubsetRun:
-    """A run from the content of a file, which leaves its failing members out: they are those of the answer."""
+    """Read a run from the content of a file; its failing members are left out, since the answer has them."""
     nothing = np.zeros(0)
     thresholds = np.array([-np.inf if bound is None else bound for bound in content["thresholds"]])
     limits = tuple(np.array([np.inf if each is None else each for each in level]) for level in content["limits"])
@@ -182,7 +182,7 @@ def _run_of(content: Mapping[str, Any]) -> SubsetRun:
 
 
 def _entries(columns: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Columns of single numbers: of a vector or a matrix its entries, "start.position[2]"."""
+    """Columns of single numbers; vectors and matrices are split into entries, such as "start.position[2]"."""
     entries = {}
     for name, values in columns.items():
         for index in np.ndindex(*values.shape[1:]):

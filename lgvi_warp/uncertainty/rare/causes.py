@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Numbers and noise that differ among failing members from all members, and the probability of each of several conditions."""
+"""Numbers and noise that differ between failing and all members, and the probability of each condition."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ FEW_DRAWS, PARTS = 20, 4
 
 
 class Chance(NamedTuple):
-    """A probability, and the ends of its 95 % interval."""
+    """A probability with the ends of its 95 % interval."""
 
     probability: float
     lower: float
@@ -28,7 +28,7 @@ class Chance(NamedTuple):
 
 
 class Moves(NamedTuple):
-    """Failing members compared with all: mean, mean absolute value and standard deviation [sd], and the largest z-score."""
+    """Failing members against all: mean, mean absolute value and standard deviation [sd], and the largest z-score."""
 
     mean: np.ndarray
     size: np.ndarray
@@ -37,7 +37,7 @@ class Moves(NamedTuple):
 
 
 def mean_and_error(x: np.ndarray, weights: np.ndarray, chains: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Weighted mean of numbers (m, k), and its standard error where those of one chain are related. (E15)."""
+    """Weighted mean of numbers (m, k), and its standard error if members of one chain are related. (E15)."""
     mean = weights @ x
     order, first = np.argsort(chains, kind="stable"), np.unique(np.sort(chains), return_index=True)[1]
     away = np.add.reduceat((weights[:, None] * (x - mean))[order], first, axis=0)
@@ -57,7 +57,7 @@ def moves_of(u: np.ndarray, weights: np.ndarray, chains: np.ndarray) -> Moves:
 
 
 def noise_score(x: np.ndarray, weights: np.ndarray, chains: np.ndarray, parts: np.ndarray) -> float:
-    """A z-score of the draws (m, k) of a source: of their mean path, or of their sum of squares, whichever is larger.
+    """The z-score of the draws (m, k) of a source: the larger of the mean path's and the sum of squares'.
 
     docs/theory/rare_events.md, (B17).
     """
@@ -74,9 +74,9 @@ def noise_score(x: np.ndarray, weights: np.ndarray, chains: np.ndarray, parts: n
 
 
 def moved_texts(moved: Mapping[str, Sequence[float]], noise: Mapping[str, float], normal: Container[str]) -> list[str]:
-    """Significant differences in words, the clearest first.
+    """Texts of significant differences, the clearest first.
 
-    moved: (mean, size, spread, z) by name. noise: z by name. normal: numbers that are normal, whose middle is their mean.
+    moved: name -> (mean, size, spread, z). noise: name -> z. normal: names of normal numbers, whose middle is their mean.
     """
     said = [(z, f"the noise of {name} differs from that of all (z = {z:.0f})") for name, z in noise.items()]
     for name, (mean, size, spread, z) in moved.items():
@@ -86,7 +86,7 @@ def moved_texts(moved: Mapping[str, Sequence[float]], noise: Mapping[str, float]
 
 
 def _words(middle: str, mean: float, size: float, spread: float) -> str:
-    """A difference in words; "" for none that is worth a line. Deviations of other laws are those of the normal score."""
+    """Text of a difference; "" if it is small. For distributions that are not normal, it concerns the normal score."""
     deviations = "standard deviations" if middle == "mean" else "standard deviations of its normal score"
     away = f"is on average {abs(mean):.1f} {deviations} {'below' if mean < 0.0 else 'above'} its {middle}"
     if abs(mean) >= max(LEAST_MEAN, 0.5 * size):
@@ -105,9 +105,9 @@ FEW_MET = 10.0
 def chances_of(
     names: Iterable[str], rows: np.ndarray, weights: np.ndarray, ancestors: np.ndarray, of_any: Chance, spread: float
 ) -> dict[str, Chance]:
-    """Probability of each condition alone, of any and of all, from the failing members' limits (k, m).
+    """Probabilities of each condition alone, of any and of all of them, from the failing members' limits (k, m).
 
-    ancestors: (m,), those of one are related. spread: of the relative error of the probability of any.
+    ancestors: (m,), members with the same ancestor are related. spread: relative error of the probability of any.
     docs/theory/rare_events.md, (B13).
     """
     from scipy.stats import chi2, t

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Cheaper settings for chains: which one tells, of members that are nearly failing, what the scene itself would."""
+"""Cheaper settings for chains: choose one that agrees with the scene itself for members near failure."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ SETTINGS = frozenset(inspect.signature(prepare).parameters) - {
 
 @dataclass(frozen=True)
 class Cheaper:
-    """A cheaper setting; name: what differs, in words."""
+    """A cheaper setting; name: text of the differences."""
 
     name: str
     fleet: Ensemble
@@ -46,7 +46,7 @@ class Cheaper:
 
 @dataclass(frozen=True, eq=False)
 class ChainLimit:
-    """A cheaper limit in the scale of the scene's own; margin: see `MARGIN`."""
+    """A cheaper limit, scaled to the scene's own limit; margin: see `MARGIN`."""
 
     limit: VehicleLimit
     name: str
@@ -59,7 +59,7 @@ class ChainLimit:
 
 
 def cheaper_of(entries: Any, fleet: Ensemble, settings: Mapping[str, Any]) -> list[Cheaper]:
-    """Read the cheaper settings: mappings of numbers of the scene and settings of the run to their values."""
+    """Read the cheaper settings: dicts of numbers of the scene and settings of the run."""
     listed = items_of(entries)
     if listed is None:
         raise refusal("cheaper", entries, "is not a list", 'give [{"h": 0.1, "dtype": "float32"}]')
@@ -90,7 +90,7 @@ def _cheaper(key: str, entry: Mapping[str, Any], fleet: Ensemble, settings: Mapp
 def chosen_chain(
     own: VehicleLimit, others: Mapping[str, VehicleLimit], seed: int
 ) -> tuple[ChainLimit | None, list[str]]:
-    """The fastest limit that tells what the scene's own does of members that are nearly failing; None, and why, for none."""
+    """The fastest limit that agrees with the scene's own near failure; None if there is none, and notes."""
     notes = []
     for name, other in others.items():
         if other.d != own.d or other.names != own.names:
@@ -112,7 +112,7 @@ def chosen_chain(
 
 
 def compared(own: np.ndarray, other: np.ndarray) -> tuple[float, float, float, float]:
-    """(offset, slope, standard deviation of what is missed, squared correlation) of limits as a line of others (n,)."""
+    """Linear fit of limits by others (n,): (offset, slope, standard deviation of residuals, squared correlation)."""
     ordinary = (np.abs(own) < 1e300) & (np.abs(other) < 1e300)
     x, y = other[ordinary], own[ordinary]
     if len(x) < 16 or not (x.std() > 0.0 and y.std() > 0.0):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The event that is asked for: a quantity above 0, conditions in a sweep's words, or the name of an event of the scene."""
+"""The event of `rare_event`: a quantity above 0, conditions as in a sweep, or the name of an event of the scene."""
 
 from __future__ import annotations
 
@@ -43,10 +43,10 @@ LESS, MORE = re.compile(rf"(.*\S)\s*([+-])\s*({NUMBER[5:]})"), re.compile(rf"({N
 
 @dataclass(frozen=True)
 class RareCondition:
-    """Condition of a rare event: a quantity between two bounds, or any of several metrics between theirs, or a status.
+    """Condition of a rare event: a quantity or any of several metrics between two bounds, or a status.
 
-    label: in words. of: the quantity, None where metrics say it. limits: name -> (above, below), of the quantity or of each
-    metric. metrics: by name. statuses: of which each is the event too.
+    label: text of the condition. of: the quantity, None for metrics. limits: name of the quantity or of each metric ->
+    (above, below). metrics: metrics by name. statuses: statuses that count as the event, too.
     """
 
     label: str
@@ -57,11 +57,11 @@ class RareCondition:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Conditions in words, each of which alone is the event, in the order of the limits; none where a status is, too."""
+        """Texts of the conditions, in the order of the limits; empty if a status also counts as the event."""
         return () if self.statuses else tuple(_words(name, *ends) for name, ends in self.limits.items())
 
     def arguments(self, scene: Any, h: float | None = None) -> dict[str, Any]:
-        """Arguments of `prepare` for it; h: step of the run [s], None for that of the scene."""
+        """Arguments of `prepare` for the condition; h: step of the run [s], None for the scene's step."""
         if self.of is not None:
             return {"of": self.of, "failed": "nan"}
         faults = Faults()
@@ -76,7 +76,7 @@ class RareCondition:
     def distances(self, answer: Any) -> tuple[np.ndarray, np.ndarray]:
         """Distances of members beyond the bounds of each limit (k, n), and a mask of failed ones (n,).
 
-        answer: What the prepared run returned.
+        answer: Return value of the prepared run.
         """
         if self.of is None:
             status = np.asarray(answer.status)
@@ -95,13 +95,13 @@ class RareCondition:
 
 
 def between(values: np.ndarray, above: float, below: float) -> np.ndarray:
-    """Distance of numbers from the nearer of two bounds, below 0 outside; a number that is NaN fulfils nothing."""
+    """Distance of numbers from the nearer of two bounds, negative outside; NaN is outside."""
     inside = np.minimum(values - above, below - values)
     return np.asarray(np.clip(np.nan_to_num(inside, nan=-SURE), -SURE, SURE))
 
 
 def condition_of(limit: Any, scene: Any) -> RareCondition:
-    """Read the event that is asked for."""
+    """Read the requested event."""
     if isinstance(limit, RareCondition):
         return limit
     if isinstance(limit, Mapping):
@@ -116,7 +116,7 @@ def condition_of(limit: Any, scene: Any) -> RareCondition:
 
 
 def _bounded(function: Callable[..., Any]) -> Callable[..., Any]:
-    """A function of a Result whose infinite numbers are the largest there are: NaN alone is of a member that failed."""
+    """Make infinite numbers of a function of a Result finite, so that only NaN means a failed member."""
 
     @functools.wraps(function)
     def bounded(*arguments: Any) -> Any:
@@ -127,7 +127,7 @@ def _bounded(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def has_bound(text: str) -> bool:
-    """Whether a text names the bound of its quantity."""
+    """True if a text contains a bound of its quantity."""
     return any(pattern.fullmatch(text) for pattern in (ABOVE_OR_BELOW, LESS, MORE))
 
 
@@ -172,7 +172,7 @@ def _of_event(event: Any) -> RareCondition:
 
 
 def _of_conditions(conditions: dict[str, Any]) -> RareCondition:
-    """Conditions in a sweep's words, each of which is the event."""
+    """Read conditions as in a sweep, any of which is the event."""
     names = [name for name in conditions if name != "status"]
     if not names:
         problem = "is a status, which is there or not: nothing says how near a member is to it"
@@ -199,7 +199,7 @@ def _of_conditions(conditions: dict[str, Any]) -> RareCondition:
 
 
 def _refuse_end(name: Any) -> None:
-    """Refuse a number at the end beside other conditions, which are of the whole path."""
+    """Refuse a number at the end together with other conditions, since these concern the whole path."""
     if not isinstance(name, str) or names_a_statistic(name):
         return
     of = functional("limit", name)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The success of a sweep turned round: the event that a member does not pass."""
+"""The opposite of a sweep's success: the event that a member does not pass."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ FAR = 1e300
 
 @dataclass(frozen=True)
 class FailingCondition(RareCondition):
-    """The event that a member does not pass; success: what it must fulfil.
+    """The event that a member does not pass; success: the conditions to pass.
 
-    metrics: those that success limits, and the distances to events that would end success, by which chains go to them.
-    endings: (key, status) of these events by the names of their metrics.
+    metrics: those that success limits, and distances to events that prevent success, which guide the chains.
+    endings: name of a distance metric -> (key, status) of its event.
     """
 
     success: Success = field(default_factory=Success)
@@ -54,14 +54,14 @@ class FailingCondition(RareCondition):
 
 
 def _outside(values: np.ndarray, above: float, below: float) -> np.ndarray:
-    """Distance of numbers outside of two bounds, above 0 where they do not lie between them; NaN never does."""
+    """Distance of numbers outside two bounds, positive if they are not between them; NaN counts as outside."""
     # A number at a bound does not pass, so that the event begins at the number next to it.
     low, high = np.nextafter(above, np.inf), np.nextafter(below, -np.inf)
     return np.asarray(np.clip(np.nan_to_num(np.maximum(low - values, values - high), nan=FAR), -FAR, FAR))
 
 
 def failing_of(success: Success, metrics: Mapping[str, Statistic], scene: Any) -> FailingCondition:
-    """The event that a member of a scene does not pass; metrics: of the sweep, by name. Raises SceneError."""
+    """The event that a member of a scene does not pass; metrics: the sweep's, by name. Raises SceneError."""
     known, endings = {name: metrics[name] for name in success.limits}, dict[str, tuple[str, int]]()
     ended = [event for event in scene.events if not Success(success.status).passed(np.array([event.status]), {})[0]]
     for event in ended:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Members on their way to an event: where they are at a look, and a score of how near they are to it."""
+"""Members on their way to an event: their states at a checkpoint ("look"), and a score of their nearness to it."""
 
 from __future__ import annotations
 
@@ -17,11 +17,12 @@ LEAST_SPREAD, CUT, LEAST_MISSED = 1e-12, 1e-8, 1e-12
 
 @dataclass(frozen=True, eq=False)
 class Flock:
-    """Members at one look.
+    """Members at one checkpoint.
 
-    look: number of the look; 0 at the start. place: what a walk goes on from, with `part(rows)`. values: (c, n), the numbers
-    that the event is of, so far. distances: (c, n), how far these are beyond their bounds. features: (n, f), numbers that may
-    tell what comes. happened, over, lost: (n,), whether the event has happened, the member goes no further, it failed.
+    look: number of the checkpoint; 0 at the start. place: states from which a walk continues, with `part(rows)`.
+    values: (c, n), the event's numbers so far. distances: (c, n), their distances beyond the bounds. features: (n, f),
+    numbers that may predict the event. happened, over, lost: (n,), True if the event happened, the member ended, or
+    failed.
     """
 
     look: int
@@ -34,14 +35,14 @@ class Flock:
     lost: np.ndarray
 
     def part(self, rows: np.ndarray) -> Flock:
-        """Some of the members; one may come several times."""
+        """Some of the members; a member may occur several times."""
         return Flock(
             self.look, self.place.part(rows), self.values[:, rows], self.distances[:, rows], self.features[rows],
             self.happened[rows], self.over[rows], self.lost[rows],
         )  # fmt: skip
 
     def beside(self, others: Sequence[Flock], place: Any) -> Flock:
-        """These members and then others at the same look, whose places are joined."""
+        """These members followed by others at the same checkpoint; place: their joined states."""
         flocks = [self, *others]
         rows = {name: np.concatenate([getattr(flock, name) for flock in flocks], axis=axis)
                 for name, axis in AXES.items()}  # fmt: skip
@@ -53,11 +54,11 @@ AXES = {"values": 1, "distances": 1, "features": 0, "happened": 0, "over": 0, "l
 
 
 class Walk(Protocol):
-    """Motion of members from look to look.
+    """Motion of members from checkpoint to checkpoint.
 
-    looks: number of the last look. d: number of normals that a member starts with. lasting: (c,), for each number that the
-    event is of, whether the event has happened once it is beyond its bounds; else it must be so at the last look.
-    stretches: what keeps the way from level to level, as `Stretches`; None for nothing.
+    looks: number of the last checkpoint. d: number of normals of a member's start. lasting: (c,), for each number of
+    the event, True if the event happens once the number is beyond its bounds, False if only the last checkpoint counts.
+    stretches: store of the runs from level to level, as `Stretches`; None for none.
     """
 
     looks: int
@@ -69,20 +70,20 @@ class Walk(Protocol):
         """Members at the start, of standard normals (n, d)."""
 
     def keys(self, count: int) -> np.ndarray:
-        """Keys (n,) of noise that no member has had."""
+        """Keys (n,) of noise that no member has used."""
 
     def advance(self, flock: Flock, keys: np.ndarray) -> Flock:
-        """The members at the next look, with the noise of these keys."""
+        """Advance the members to the next checkpoint, with the noise of these keys."""
 
     def joined(self, flocks: Sequence[Flock]) -> Flock:
-        """Flocks of one look as one."""
+        """Join flocks at one checkpoint."""
 
 
 @dataclass(frozen=True, eq=False)
 class ExpectedLimit:
-    """Expected limit at the last look: linear in the numbers of members at a look.
+    """Expected limit at the last checkpoint: a linear function of the members' numbers at a checkpoint.
 
-    level: the mean. centre, slopes: (f,). missed: standard deviation of what the line misses.
+    level: the mean. centre, slopes: (f,). missed: standard deviation of the residuals.
     """
 
     level: float
@@ -92,7 +93,7 @@ class ExpectedLimit:
 
     @classmethod
     def nearest(cls, x: np.ndarray, y: np.ndarray) -> ExpectedLimit:
-        """The line nearest to y (n,) at x (n, f)."""
+        """Least-squares fit to y (n,) at x (n, f)."""
         centre, spread = x.mean(axis=0), x.std(axis=0)
         varies = spread > LEAST_SPREAD * np.maximum(1.0, np.abs(centre))
         slopes, left = np.zeros(x.shape[1]), y - y.mean()
@@ -103,7 +104,7 @@ class ExpectedLimit:
         return cls(float(y.mean()), centre, slopes, float(left.std()))
 
     def __call__(self, x: np.ndarray) -> np.ndarray:
-        """Expected limit (n,) at x (n, f); -inf where that is no number."""
+        """Expected limit (n,) at x (n, f); -inf if it is not finite."""
         with np.errstate(all="ignore"):
             expected = self.level + (x - self.centre) @ self.slopes
         return np.where(np.isfinite(expected), expected, -np.inf)
@@ -111,11 +112,11 @@ class ExpectedLimit:
 
 @dataclass(frozen=True, eq=False)
 class Score:
-    """Score of members' nearness to the event: their expected limit at the last look, in units of its error.
+    """Score of members' nearness to the event: their expected limit at the last checkpoint, in units of its error.
 
-    That is as members of a plain run have it. It steers alone: whatever it says, the answer has the mean that is right.
+    It is fitted to members of a plain run. It only guides the search: any score leaves the answer unbiased.
 
-    spreads: (c,), what distances are measured in. lasting: as of a Walk. lines: by look.
+    spreads: (c,), units of the distances. lasting: as in `Walk`. lines: fits by checkpoint.
     """
 
     spreads: np.ndarray
@@ -124,9 +125,9 @@ class Score:
 
     @classmethod
     def fitted(cls, log: Sequence[tuple[np.ndarray, Flock]], walk: Walk, spreads: np.ndarray) -> Score:
-        """The score that members of a plain run say, which were seen at the looks in the log.
+        """Fit the score to members of a plain run, from their logged states at checkpoints.
 
-        log: (rows, flock) of every look; members that are over are not seen again.
+        log: (rows, flock) of every checkpoint; members that have ended do not appear again.
         """
         end = np.full(int(max(rows.max() for rows, _ in log)) + 1, np.nan)
         for rows, flock in log:
@@ -140,7 +141,7 @@ class Score:
         return cls(spreads, walk.lasting, lines)
 
     def __call__(self, flock: Flock) -> np.ndarray:
-        """The scores (n,) of members at a look: infinite where the event has happened, -inf where it cannot any more."""
+        """Scores (n,) of members at a checkpoint: infinite if the event has happened, -inf if it no longer can."""
         score = np.full(len(flock.over), -np.inf)
         line = self.lines.get(flock.look)
         if line is not None:
@@ -152,5 +153,5 @@ class Score:
 
 
 def _numbers_of(flock: Flock, spreads: np.ndarray) -> np.ndarray:
-    """Numbers of members at a look (n, f), their limit so far among them."""
+    """Numbers of members at a checkpoint (n, f), including their limit so far."""
     return np.column_stack([np.clip(limits_of(flock.distances, spreads), -1e300, 1e300), flock.features])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""An event's numbers, followed from piece to piece of a run."""
+"""Update an event's numbers from interval to interval of a run."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ REMEDY = (
 
 @dataclass(frozen=True)
 class Followed:
-    """A number that is followed; above, below: the bounds between which it is the event."""
+    """A number updated over time; above, below: bounds between which it means the event."""
 
     combine: Combine
     above: float
@@ -39,14 +39,14 @@ class Followed:
 
     @property
     def lasting(self) -> bool:
-        """Whether the event has happened once the number is between the bounds."""
+        """True if the event has happened once the number is between the bounds."""
         if self.combine is None:
             return False
         return bool(np.isinf(self.above) if self.combine is np.fmin else np.isinf(self.below))
 
 
 def followed(condition: RareCondition) -> tuple[Followed, ...]:
-    """Way of following each number of an event. Raises SceneError for one that pieces of a run do not tell."""
+    """Updates of each number of an event. Raises SceneError if intervals of a run do not determine a number."""
     if condition.of is not None:
         (quantity,) = quantities(condition.of)
         return tuple(Followed(_of_quantity(quantity), *ends) for ends in condition.limits.values())
@@ -63,7 +63,7 @@ def _of_quantity(quantity: OfResult) -> Combine:
 
 
 def _of_path(label: str, of: Functional) -> Combine:
-    """Way of following a functional: a length after the greatest entries of a vector is not that of the path."""
+    """Update of a functional; refused if it cannot be combined over intervals, as the norm of a vector's maxima."""
     if not of.over_path:
         return None
     name = of.functions[-1]
@@ -81,7 +81,7 @@ def _of_metric(name: str, metric: Statistic) -> Combine:
 
 
 def looks_of(condition: RareCondition, scene: Any, settings: Mapping[str, Any]) -> SaveAt:
-    """The samples that each piece of a run looks at, from the settings of `prepare`."""
+    """The samples that each interval of a run uses, from the settings of `prepare`."""
     own = settings.get("save")
     if isinstance(own, SaveAt) and own.at is not None:
         raise refusal("save", "SaveAt(at=...)", "names times of a whole run, which goes in pieces", "give every=")

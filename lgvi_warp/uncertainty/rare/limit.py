@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The limit of an event as a function of standard normals: those of the numbers that vary, then the draws of noise."""
+"""The limit function of an event, of standard normals: first for the varied numbers, then for the draws of noise."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ NEAREST_LEVEL = 2.0**-53
 
 
 class Varying:
-    """The numbers that vary of a scene's members, as standard normals.
+    """The varied numbers of a scene's members, as standard normals.
 
     Attributes:
-        names: names of the numbers, one a normal.
+        names: names of the numbers; each number has one normal.
     """
 
     names: tuple[str, ...] = ()
@@ -46,18 +46,18 @@ class Varying:
             raise refusal("fleet", "...", "has members that were given one by one", "give distributions in vary")
 
     def states(self, count: int) -> dict[str, Any]:
-        """So many times the start of a scene where no number varies."""
+        """The start of a scene, `count` times, if no number varies."""
         member = self.fleet.select(0, 1)
         return {name: np.repeat(getattr(member, name), count, axis=0) for name in FIELDS}
 
     def levels(self, u: np.ndarray) -> np.ndarray:
-        """Levels in (0, 1) of the numbers that vary, in the order of the names."""
+        """Levels in (0, 1) of the varied numbers, in the order of the names."""
         from scipy.special import ndtr
 
         return np.asarray(np.clip(ndtr(u[:, : len(self.names)]), NEAREST_LEVEL, 1.0 - NEAREST_LEVEL))
 
     def values(self, u: np.ndarray) -> dict[str, np.ndarray]:
-        """Values (n, ...) of what varies, by name."""
+        """Values (n, ...) of the varied numbers, by name."""
         fleet = self.fleet
         described = as_given(fleet)
         columns = [column for variation in described for column in columns_of(fleet.space, variation.key)]
@@ -68,20 +68,20 @@ class Varying:
         return {target.label: values for target, values in drawn}
 
     def table(self, u: np.ndarray) -> Table | None:
-        """Members with these normals as a table for `lw.Ensemble`; None where noise alone varies."""
+        """Members with these normals as a table for `lw.Ensemble`; None if only noise varies."""
         return Table(values=self.values(u)) if self.names and len(u) else None
 
 
 class VehicleLimit(Varying):
-    """A scene as a limit: (n, d) standard normals -> (n,), above 0 where the event happens.
+    """A scene as a limit function: standard normals (n, d) -> limits (n,), positive if the event happens.
 
-    fleet: the scene and what varies. condition: the event. settings: of `prepare`. failed: "event", so that a member that
-    fails has the limit `FAILED`, or "refuse". remembered: where calls are kept, by a name; None for nowhere.
+    fleet: the scene and its distributions. condition: the event. settings: arguments of `prepare`. failed: "event"
+    gives failed members the limit `FAILED`; or "refuse". remembered: store of calls, by a name; None for none.
 
     Attributes:
-        names: names of the numbers that vary, whose normals come first.
-        draws: number of normals of noise, which follow.
-        members, seconds: members that were run, and how long that took [s].
+        names: names of the varied numbers, whose normals come first.
+        draws: number of normals of noise, which come after these.
+        members, seconds: number of members that were run, and their time [s].
     """
 
     def __init__(
@@ -120,26 +120,26 @@ class VehicleLimit(Varying):
         return np.asarray(limits)
 
     def each(self, u: np.ndarray) -> np.ndarray:
-        """The limits (k, n) by each condition, in its own unit; members that fail have the limit `FAILED` by all."""
+        """The limits (k, n) of each condition, in its own unit; failed members have the limit `FAILED` for all."""
         rows, lost = self._parts(u)
         if self._refuse:
             refuse_lost(lost)
         return np.where(lost, FAILED, rows)
 
     def tolerant(self, u: np.ndarray) -> np.ndarray:
-        """Limit like `each`, where failed members would be refused: such a member does not meet the event."""
+        """Limits like `each`, but if failed members are refused, they count as not meeting the event."""
         rows, lost = self._parts(u)
         return np.where(lost, -SURE if self._refuse else FAILED, rows)
 
     def _parts(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Limits (k, n) and which members failed (n,), run or remembered."""
+        """Limits (k, n) and a mask of failed members (n,), from a run or from the store."""
         rows, lost, seconds = self._remembered(self._name, self._ran, u)
         self.seconds += float(seconds)
         self.members += len(u)
         return rows, lost
 
     def _ran(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Limits (k, n), which members failed (n,), so many at once as memory holds, and how long it took [s]."""
+        """Limits (k, n), a mask of failed members (n,), and the time [s]; as many members at once as memory holds."""
         at_once, begin = max(1, MOST_NUMBERS // self.d), time.perf_counter()
         parts = [self.condition.distances(self._answers(u[i : i + at_once])) for i in range(0, len(u), at_once)]
         seconds = np.array(time.perf_counter() - begin)
@@ -155,20 +155,20 @@ class VehicleLimit(Varying):
 
 
 def refuse_lost(lost: np.ndarray) -> None:
-    """Raise FailedMembers where members (n,) failed."""
+    """Raise FailedMembers if members (n,) failed."""
     if lost.any():
         problem = f"limit: {int(lost.sum())} of {len(lost)} members failed, or have a number that is not finite"
         raise FailedMembers([f'{problem}. Fix the failing members, or count them as the event: failed="event"'])
 
 
 def limits_of(distances: np.ndarray, spreads: np.ndarray) -> np.ndarray:
-    """The limits (n,) of distances (c, n), each in what it is measured in."""
+    """The limits (n,): the largest of the distances (c, n), each in its unit."""
     with np.errstate(over="ignore"):
         return np.asarray(np.clip(distances / spreads[:, None], -SURE, SURE).max(axis=0))
 
 
 def spreads_of(distances: np.ndarray) -> np.ndarray:
-    """Unit of each limit (k, n): its standard deviation; 1 where it is alone, and stays in its unit."""
+    """Unit of each limit (k, n): its standard deviation; 1 for a single limit, which keeps its unit."""
     if len(distances) == 1:
         return np.ones(1)
     ordinary = np.where(np.abs(distances) < 1e300, distances, np.nan)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Importance sampling from failing members: a Gaussian mixture of them, weights, and whether the answer may be believed."""
+"""Importance sampling from failing members: a Gaussian mixture, weights, and checks of the answer."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Mixture:
         return np.asarray(self.means[part] + np.einsum("nij,nj->ni", self.roots[part], z))
 
     def log_parts(self, u: np.ndarray) -> np.ndarray:
-        """Logarithm of each part's share of the density at points (n, d): (n, k)."""
+        """Logarithm of each component's contribution to the density at points (n, d): (n, k)."""
         logs = []
         for share, mean, root in zip(self.shares, self.means, self.roots, strict=True):
             # A triangular solve, however small, wakes all threads of LAPACK: 20 ms on a busy machine.
@@ -57,7 +57,7 @@ class Mixture:
         return np.asarray(logsumexp(self.log_parts(u), axis=1))
 
     def widened(self) -> Mixture:
-        """Parts somewhat wider than those that were fitted, and beside each one wider still, which bounds the weights."""
+        """Widen the components slightly, and add a much wider one to each, which bounds the weights."""
         parts = [_as_where_free(mean, root) for mean, root in zip(self.means, self.roots, strict=True)]
         means, fitted = (np.stack(column) for column in zip(*parts, strict=True))
         roots = np.concatenate([WIDER * fitted, WIDER * WIDE * fitted])
@@ -66,9 +66,9 @@ class Mixture:
 
 
 def _parts(u: np.ndarray, columns: int) -> list[np.ndarray]:
-    """Rows of u (n, d) in parts whose product with so many columns BLAS makes without threads.
+    """Split rows of u (n, d) into blocks whose product with `columns` columns BLAS computes without threads.
 
-    Its threads wait for each other at each product: on a busy machine that takes fifty times as long as the products.
+    BLAS threads wait for each other at each product, which on a busy machine takes fifty times as long as the products.
     """
     step = max(UNTHREADED // (u.shape[1] * columns), 1)
     return [u[i : i + step] for i in range(0, max(len(u), 1), step)]
@@ -80,13 +80,13 @@ def _by_rows(u: np.ndarray, matrix: np.ndarray) -> np.ndarray:
 
 
 def together(mixtures: Sequence[Mixture], shares: np.ndarray) -> Mixture:
-    """One mixture of several, with these shares (k,)."""
+    """Join several mixtures to one, with these shares (k,)."""
     own = np.concatenate([share * each.shares for share, each in zip(shares, mixtures, strict=True)])
     return Mixture(own, *(np.concatenate([getattr(each, name) for each in mixtures]) for name in ("means", "roots")))
 
 
 def _as_where_free(mean: np.ndarray, root: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """A part with mean 0 and variance 1 along axes on which the event tells nothing: few chains find these only roughly."""
+    """Set mean 0 and variance 1 along axes that do not matter for the event: few chains find these only roughly."""
     variances, axes = np.linalg.eigh(root @ root.T)
     along = axes.T @ mean
     free = (variances > FREE[0]) & (variances < FREE[1]) & (np.abs(along) < FREE_MEAN)
@@ -95,7 +95,7 @@ def _as_where_free(mean: np.ndarray, root: np.ndarray) -> tuple[np.ndarray, np.n
 
 
 def fitted(points: np.ndarray, rng: np.random.Generator) -> Mixture:
-    """The mixture of 1 to 4 parts that describes points (n, d) best, by BIC (Schwarz 1978).
+    """Fit the mixture of 1 to 4 components that describes points (n, d) best, by BIC (Schwarz 1978).
 
     docs/theory/rare_events.md, (B9).
     """
@@ -118,7 +118,7 @@ def fitted(points: np.ndarray, rng: np.random.Generator) -> Mixture:
 
 
 def _maximised(points: np.ndarray, k: int, rng: np.random.Generator) -> tuple[Mixture, float]:
-    """A mixture of k parts by expectation and maximisation (Dempster, Laird & Rubin 1977), and its log-likelihood."""
+    """A mixture of k components by expectation-maximisation (Dempster, Laird & Rubin 1977), and its log-likelihood."""
     from scipy.special import logsumexp
 
     centres = points[[int(rng.integers(len(points)))]]
@@ -142,7 +142,7 @@ def _maximised(points: np.ndarray, k: int, rng: np.random.Generator) -> tuple[Mi
 
 
 def _of_shares(points: np.ndarray, shares: np.ndarray) -> Mixture:
-    """The mixture whose parts have these shares (n, k) of the points (n, d)."""
+    """The mixture whose components have these shares (n, k) of the points (n, d)."""
     count, d = shares.sum(axis=0) + 1e-9, points.shape[1]
     means = (shares.T @ points) / count[:, None]
     roots = []
@@ -158,18 +158,18 @@ def _of_shares(points: np.ndarray, shares: np.ndarray) -> Mixture:
 
 @dataclass(frozen=True, eq=False)
 class WeightedMembers:
-    """Members drawn from a mixture, of which those that fail have weights.
+    """Members drawn from a mixture, with weights for those that fail.
 
     Attributes:
-        probability: of the event, the mean of the weights.
-        spread: standard deviation of its relative error.
-        effective: effective number of the weights of failing members.
-        largest: largest share of one weight.
+        probability: probability of the event, the mean of the weights.
+        spread: standard deviation of the probability's relative error.
+        effective: effective sample size of the failing members.
+        largest: largest fraction of the sum that one weight has.
         failing: (m, d), standard normals of the failing members.
-        limits: (m,), their limits.
-        weights: (m,), of these; they sum to 1.
+        limits: (m,), limits of the failing members.
+        weights: (m,), weights of the failing members; they sum to 1.
         members: number of members that were drawn.
-        rows: (k, m), the limits by each condition.
+        rows: (k, m), the limits of each condition.
     """
 
     probability: float
@@ -184,7 +184,7 @@ class WeightedMembers:
 
     @classmethod
     def of(cls, u: np.ndarray, limits: np.ndarray, mixture: Mixture) -> WeightedMembers:
-        """From points (n, d) of a mixture, and their limits (k, n) or (n,). docs/theory/rare_events.md, (B8), (B10)."""
+        """For points (n, d) of a mixture, with limits (k, n) or (n,). docs/theory/rare_events.md, (B8), (B10)."""
         rows = np.atleast_2d(limits)
         happens = (rows > 0.0).any(axis=0)
         failing, rows, theirs = u[happens], rows[:, happens], rows[:, happens].max(axis=0, initial=-math.inf)
@@ -199,7 +199,7 @@ class WeightedMembers:
 
 
 def log_weights(mixture: Mixture, u: np.ndarray) -> np.ndarray:
-    """Logarithm of the standard normal density over that of the mixture, at points (n, d): (n,).
+    """Logarithm of the standard normal density divided by the mixture's, at points (n, d): (n,).
 
     docs/theory/rare_events.md, (B8).
     """
@@ -216,10 +216,10 @@ def doubts(
     asked: float,
     seen: np.ndarray | None = None,
 ) -> list[str]:
-    """Why the weights are not the answer; empty where they are.
+    """Reasons why the weights are not the answer; empty if they are.
 
-    probability, spread: of the chains; None where these did not arrive. failing: each run's failing members (m, d). asked: the
-    relative error wanted. seen: (m,), which of the weighted members lie where the chains went; None for all.
+    probability, spread: the chains' answer; None if they did not arrive. failing: each run's failing members (m, d).
+    asked: the requested relative error. seen: (m,), mask of weighted members where chains went; None for all.
     """
     reasons = []
     if weighted.spread > asked:
@@ -238,13 +238,13 @@ def doubts(
 
 
 def effective_wanted(weighted: WeightedMembers) -> float:
-    """The effective number of weights that it takes: more where a mixture has more to learn."""
+    """The required effective sample size: it grows with the number of the mixture's parameters."""
     d = weighted.failing.shape[1]
     return max(EFFECTIVE, EFFECTIVE_EACH * d * (d + 1) / 2)
 
 
 def wanting(weighted: WeightedMembers, asked: float) -> float:
-    """Factor on the number of draws for this relative error, and for sufficiently even weights."""
+    """Factor by which the number of draws must grow for this relative error, and for sufficiently even weights."""
     if not math.isfinite(weighted.spread):
         return math.inf
     return max(
@@ -253,6 +253,6 @@ def wanting(weighted: WeightedMembers, asked: float) -> float:
 
 
 def uncovered(weighted: WeightedMembers, mixture: Mixture, failing: Sequence[np.ndarray]) -> float:
-    """The largest part of a run's failing members at which one weight would be larger than may be."""
+    """The largest fraction of a run's failing members at which a single weight would be too large."""
     most = math.log(LARGEST * weighted.probability * weighted.members)
     return max((float((log_weights(mixture, each) > most).mean()) for each in failing if len(each)), default=0.0)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""New starts for members that reached a level: with the noise that they had, as probable as they should be.
+"""New starts for members that reached a level: Metropolis steps with the members' own noise.
 
-Copies of a member share its start. A Metropolis step from each start, kept where the member still reaches the level with its
-own noise, leaves the law of members at the level what it is, so that the answer's mean is right whatever the steps.
+Copies of a member share its start. A Metropolis step from each start is accepted if the member still reaches the level
+with its own noise. This keeps the distribution of members at the level, so any steps leave the answer unbiased.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from lgvi_warp.uncertainty.rare.stages import Log, Stage, by_look, note, walked
 def moved(
     walk: Walk, score: Score, before: list[Stage], stage: Stage, bound: float, step: np.ndarray,
     generators: Sequence[np.random.Generator]) -> tuple[Stage, float]:  # fmt: skip
-    """A stage after a step (d,) from each start from where its member reaches the bound, too, and the part that did.
+    """A stage after a step (d,) from each start, accepted if the member reaches the bound; and the accepted fraction.
 
-    before: the stages that led to this one, which is put after them. generators: one for each independent run.
+    before: the stages that led to this one, which is appended to them. generators: one for each independent run.
     """
     counts = np.bincount(stage.run, minlength=len(generators))
     z = np.concatenate([rng.standard_normal((count, walk.d)) for rng, count in zip(generators, counts, strict=True)])
@@ -46,7 +46,7 @@ def moved(
 
 
 def noise_of(stages: Sequence[Stage]) -> Callable[[int], np.ndarray]:
-    """The keys (n,) of the noise that members of the last stage have from a look to the next."""
+    """Function of a checkpoint: keys (n,) of the last stage's noise up to the next checkpoint."""
     rows = np.arange(len(stages[-1].key))
     looks, keys = list[np.ndarray](), list[np.ndarray]()
     for stage in reversed(stages):

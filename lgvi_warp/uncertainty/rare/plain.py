@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Plain sampling of a limit function of standard normals, by Sobol points where there are few of them."""
+"""Plain sampling of a limit function of standard normals, by Sobol points if there are few normals."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ FEW = 50
 
 @dataclass(frozen=True, eq=False)
 class PlainAnswer:
-    """A share of members; spread: of its relative error; failing: (m, d), those that happen; limits: (m,), theirs.
+    """A probability; spread: its relative error; failing: (m, d), members with the event; limits: (m,), their limits.
 
-    rows: (k, m), the limits by each condition. bounds: the interval of 95 % of a count, where there are few; None otherwise.
+    rows: (k, m), the limits of each condition. bounds: the 95 % interval of a count, if it is small; None otherwise.
     """
 
     probability: float
@@ -35,7 +35,7 @@ class PlainAnswer:
 
 
 def counted(hits: int, count: int) -> tuple[float, float] | None:
-    """The interval of 95 % of a share of independent members where few happen (Clopper & Pearson 1934); None for many."""
+    """The 95 % interval of a fraction of independent members for few hits (Clopper & Pearson 1934); None for many."""
     from scipy.stats import beta
 
     if min(hits, count - hits) >= FEW:
@@ -47,7 +47,7 @@ def counted(hits: int, count: int) -> tuple[float, float] | None:
 def sampled(
     limit: Limit, d: int, count: int, seed: int, report: Callable[[int], None] = lambda members: None
 ) -> PlainAnswer:
-    """The probability that a limit is above 0, of at least so many members; limit: (n, d) -> (n,) or (k, n)."""
+    """The probability that a limit is positive, from at least `count` members; limit: (n, d) -> (n,) or (k, n)."""
     if d > MOST_SOBOL:
         return _at_random(limit, d, count, seed, report)
     from scipy.special import ndtri
@@ -71,13 +71,13 @@ def sampled(
 
 
 class _Failing:
-    """The members for which the event happens, batch by batch."""
+    """Collects the members for which the event happens, batch by batch."""
 
     def __init__(self, d: int):
         self._u, self._rows = [np.zeros((0, d))], list[np.ndarray]()
 
     def take(self, u: np.ndarray, limits: np.ndarray) -> int:
-        """Keep those of a batch, and return how many there are."""
+        """Keep those of a batch, and return their number."""
         limits = np.atleast_2d(limits)
         happens = (limits > 0.0).any(axis=0)
         self._u.append(u[happens])
@@ -85,7 +85,7 @@ class _Failing:
         return int(happens.sum())
 
     def all(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """(normals (m, d), limits (m,), limits by each condition (k, m))."""
+        """All members: (normals (m, d), limits (m,), limits of each condition (k, m))."""
         rows = np.concatenate(self._rows, axis=1)
         return np.concatenate(self._u), rows.max(axis=0, initial=-math.inf), rows
 

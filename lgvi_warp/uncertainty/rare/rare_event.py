@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`rare_event`: the probability of what plain sampling would hardly ever see."""
+"""`rare_event`: the probability of an event that plain sampling would hardly ever see."""
 
 from __future__ import annotations
 
@@ -72,40 +72,40 @@ def rare_event(
 ) -> RareEvent:
     """Estimate the probability of a rare event, with its interval, and list failing members.
 
-    Chains of members go level by level towards the event (subset simulation), over the numbers that vary and over the draws
-    of noise, in four independent runs. Importance sampling about the failing members then gives the answer if it passes its
-    checks; otherwise more chains do. Events more likely than 1e-3 are sampled directly.
+    Chains of members move level by level towards the event (subset simulation), over the varied numbers and the draws
+    of noise, in four independent runs. Importance sampling about the failing members then gives the answer if it passes
+    its checks; otherwise more chains give it. Events more likely than 1e-3 are sampled directly.
 
     Args:
-        fleet: A Scene or an Ensemble; what varies is its `vary`, by distributions, and its noise.
-        limit: The event: a quantity or a function of a Result that is above 0 in the event, "max(depth) - 40.0"; conditions
-            as in a sweep, {"peak depth": {"above": 12.0}}, any of which is the event; or the name of an event of the scene.
+        fleet: A Scene or an Ensemble; its distributions in `vary` and its noise make the members differ.
+        limit: The event: a quantity, such as "max(depth) - 40.0", or a function of a Result, that is positive in the event;
+            conditions as in a sweep, {"peak depth": {"above": 12.0}}, any of which is the event; or an event's name.
         relative_error: Target relative standard error of the probability, 0.005 to 0.5; 0.1 by default.
         by: "chains", the default, or "splitting", for a scene with noise and an event that can be followed in time: a
             number at the end, its max or min over the path, "max_error depth", "iae depth", or an event of the scene.
-        cheaper: Coarser settings that chains may use first; the answer is always of the scene's own setting. Each lists the
-            numbers and settings of the run that differ, [{"h": 0.1, "dtype": "float32", "controller.delay": 0.0}]. None by
-            default.
-        intervals: Splitting: number of time intervals, at most, 2 to 1,000; 50 by default. More intervals need fewer members,
-            and each costs a call. They begin at samples and at ticks of a controller.
-        failed: "event", the default: a member that fails counts as the event, and is reported apart; "refuse" for an error.
-        most: Approximate largest number of members to run, from 10,000; 1,000,000 by default. A pilot is not counted.
+        cheaper: Coarser settings that the first chains may use; the answer is always for the scene's own setting. Each
+            is a table of changed numbers and run settings, [{"h": 0.1, "dtype": "float32", "controller.delay": 0.0}].
+            None by default.
+        intervals: Splitting: maximum number of time intervals, 2 to 1,000; 50 by default. More intervals need fewer
+            members, but each costs a call. Intervals begin at samples and at ticks of a controller.
+        failed: "event" (default): a failed member counts as the event, and is reported separately; "refuse" raises an
+            error.
+        most: Approximate maximum number of members to run, without the pilot, at least 10,000; 1,000,000 by default.
         seed: Seed of all random draws; 0 by default.
-        store: Folder for the results of runs: the same call continues from there after an interruption, with the same answer;
-            with splitting level by level, after its pilot was run again. A folder of other arguments is refused. None by
-            default.
-        progress: True shows a bar or lines, as in lw.solve; a function is called with the fraction of the work that is done,
-            as far as that is known. None, the default, shows it on a terminal where more than 10 s are expected; False:
-            nothing is shown.
+        store: Folder for the results of runs: the same call continues from there after an interruption, with the same
+            answer. Splitting repeats its pilot and continues after the last complete level. A folder with results for
+            other arguments is refused. None by default.
+        progress: True shows a bar or lines, as in lw.solve; a function is called with the estimated completed fraction of
+            the work. None, the default, shows it on a terminal if more than 10 s are expected; False: nothing is shown.
         **settings: As in `lw.prepare`: method, h, t1, save, dtype, threads, ...
 
     Returns:
-        The probability, its interval, what it took, and the members for which the event happens.
+        The probability, its interval, its cost, and the members for which the event happens.
 
     Raises:
-        SceneError: If an argument is at fault; where the event never happens or always does; where the limit takes too few
-            values to show how near a member is; and where members have more draws of noise than chains can keep.
-        FailedMembers: With failed="refuse", where members failed.
+        SceneError: If an argument is at fault, the event never or always happens, the limit takes too few values to
+            show how near a member is to the event, or members have more draws of noise than chains can store.
+        FailedMembers: With failed="refuse", if members failed.
         OSError: If `store` cannot be written.
 
     Examples:
@@ -164,7 +164,7 @@ def rare_event(
 def _by_splitting(
     walk: VehicleWalk, condition: RareCondition, relative_error: float, most: int, seed: int,
     report: Callable[[float], None], settings: Mapping[str, Any]) -> RareEvent:  # fmt: skip
-    """The answer by splitting in time."""
+    """Compute the answer by splitting in time."""
     search = SplitSearch(walk, relative_error, seed, most, report)
     try:
         found = search.answer()
@@ -186,7 +186,7 @@ def _by_splitting(
 
 
 def check_asked(faults: Faults, relative_error: Any, most: Any) -> None:
-    """Note what is wrong with the error that is asked for, and with the members that may be run."""
+    """Add errors in `relative_error` and `most` to the faults."""
     error = faults.number("relative_error", relative_error)
     if error is not None and not LEAST_ERROR <= error <= 0.5:
         faults.add(
@@ -200,9 +200,9 @@ def check_asked(faults: Faults, relative_error: Any, most: Any) -> None:
 
 
 def expected_cost(own: VehicleLimit, relative_error: float) -> list[str]:
-    """Expected cost of a search with many draws of noise, shown on a terminal, too; empty for few. Raises SceneError.
+    """Text of the expected cost with many draws of noise, also shown on a terminal; "" for few. Raises SceneError.
 
-    Refused are more numbers of a level than memory should hold.
+    It refuses levels with more numbers than memory should hold.
     """
     level = LEVEL_MEMBERS * (0.1 / relative_error) ** 2
     if level * own.d > MOST_LEVEL_NUMBERS:
@@ -233,7 +233,7 @@ def expected_cost(own: VehicleLimit, relative_error: float) -> list[str]:
 
 
 def _refused(stuck: NoProgress, condition: RareCondition) -> SceneError:
-    """Refusal where chains came no nearer to the event."""
+    """Error if chains came no nearer to the event."""
     if stuck.kind == "steps":
         problem = "has the same value for most members, so that nothing says how near one is to the event"
         remedy = 'give a number that grows towards it: a distance, "peak depth above 12", or the name of an event'

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Ratio of the probabilities of two rare events, from members of either that are run in both."""
+"""Ratio of the probabilities of two rare events, from failing members of each that are run for the other."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ MOST_RUN, MOST_NUMBERS, FEWEST_SHARED = 4000, 4_000_000, 8.0
 
 @dataclass(frozen=True)
 class Share:
-    """The part of one event's members for which another happens; spread: of its relative error; count: independent members."""
+    """Fraction of an event's members for which another happens; spread: relative error; count: independent members."""
 
     value: float
     spread: float
@@ -28,7 +28,7 @@ class Share:
 
     @classmethod
     def of(cls, happens: np.ndarray, weights: np.ndarray, ancestors: np.ndarray) -> Share:
-        """From members (n,) with weights, of which those of one ancestor (n,), counted from 0, are related.
+        """Compute it from weighted members (n,); members with the same ancestor (n,), counted from 0, are related.
 
         docs/theory/rare_events.md, (B13).
         """
@@ -47,9 +47,9 @@ class Share:
 
 @dataclass(frozen=True)
 class RareRatio:
-    """Ratio of the probabilities of a second and a first event; paired: from members of either in both, or from two answers.
+    """Ratio of the probabilities of a second and a first event; paired: True if failing members were run in both.
 
-    p: of the ratio being 1, from the normal law of its logarithm.
+    p: p-value of a ratio of 1, from the normal distribution of its logarithm.
     """
 
     value: float
@@ -68,7 +68,7 @@ class FailingMembers(NamedTuple):
 
 
 def members_of(found: RareEvent) -> FailingMembers:
-    """An event's failing members, 4,000 at most: of more, drawn by their weights."""
+    """An event's failing members, at most 4,000; from more, they are drawn by their weights."""
     u, weights = np.concatenate([found.normals, found.draws], axis=1), found.weights
     ancestors = np.unique(found.ancestors, return_inverse=True)[1]
     most = min(MOST_RUN, max(100, MOST_NUMBERS // max(1, u.shape[1])))
@@ -79,9 +79,9 @@ def members_of(found: RareEvent) -> FailingMembers:
 
 
 def carried(u: np.ndarray, own: VehicleLimit, other: VehicleLimit, seed: int) -> np.ndarray:
-    """The normals of members of one limit as those of another, by the names of numbers and draws.
+    """Convert the normals of members from one limit to another, by the names of numbers and draws.
 
-    What the first does not have is drawn anew: it decides nothing there.
+    Normals that the first limit does not have are redrawn, since they have no effect there.
     """
     v = generator(seed, "rare carried").standard_normal((len(u), other.d))
     columns = {name: i for i, name in enumerate(own.names)}
@@ -97,7 +97,7 @@ def carried(u: np.ndarray, own: VehicleLimit, other: VehicleLimit, seed: int) ->
 
 
 def shared(failing: FailingMembers, own: VehicleLimit, other: VehicleLimit, seed: int = 0) -> Share:
-    """The part of an event's members for which that of another limit happens, with the same numbers and the same noise.
+    """Fraction of an event's members for which the event of another limit happens, with the same numbers and noise.
 
     docs/theory/rare_events.md, (B12).
     """
@@ -108,12 +108,12 @@ def shared(failing: FailingMembers, own: VehicleLimit, other: VehicleLimit, seed
 def ratio_of(
     first: RareEvent, second: RareEvent, of_first: Share, of_second: Share, confidence: float = 0.95
 ) -> RareRatio:
-    """The ratio of two probabilities; of_first: the part of the first's members for which the second happens; and back.
+    """The ratio of two probabilities; of_first: fraction of the first's members for which the second happens.
 
     docs/theory/rare_events.md, (B12).
 
-    P(B) / P(A) = P(B | A) / P(A | B), the best bridge between the two laws of failing members (Meng & Wong 1996), where the
-    events have members in common; the ratio of two independent answers where that is better known.
+    P(B) / P(A) = P(B | A) / P(A | B) is the best bridge between the two distributions of failing members (Meng & Wong 1996)
+    if the events have members in common. If the ratio of the two independent answers has a smaller error, it is used.
     """
     from scipy.special import ndtr, ndtri
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The probability of a rare event of standard normals: several runs of chains, then weights where they are the answer."""
+"""The probability of a rare event of standard normals: several runs of chains, then importance sampling."""
 
 from __future__ import annotations
 
@@ -63,21 +63,21 @@ class RareAnswer:
     """Answer of a search, in standard normals.
 
     Attributes:
-        probability: of the event.
-        spread: standard deviation of its relative error.
-        degrees: degrees of freedom of that spread.
+        probability: probability of the event.
+        spread: standard deviation of the probability's relative error.
+        degrees: degrees of freedom of the spread.
         estimator: "importance", "subset" or "plain".
         members: number of members that were run.
-        failing: (m, d), members for which the event happens, each once.
-        limits: (m,), their limits.
-        weights: (m,), of these; they sum to 1.
+        failing: (m, d), members for which the event happens, without duplicates.
+        limits: (m,), limits of the failing members.
+        weights: (m,), weights of the failing members; they sum to 1.
         runs: the runs of chains.
-        notes: what else is worth knowing.
-        rows: (k, m), their limits by each of k conditions.
-        chains: (m,), of each the chain, members of which are related; different numbers where none are.
-        ancestors: (m,), of each the member of a first level from which it descends.
-        parts: (m,), which of four parts each is in that are independent of each other.
-        bounds: the interval of 95 % where it is that of a count; None otherwise.
+        notes: notes for the user.
+        rows: (k, m), limits of the failing members for each of k conditions.
+        chains: (m,), chain of each failing member; members of one chain are related.
+        ancestors: (m,), member of the first level from which each failing member descends.
+        parts: (m,), index of one of four independent parts to which each failing member belongs.
+        bounds: the 95 % interval if it follows from a count; None otherwise.
     """
 
     probability: float
@@ -97,7 +97,7 @@ class RareAnswer:
     bounds: tuple[float, float] | None = None
 
     def interval(self, confidence: float = 0.95) -> tuple[float, float]:
-        """The interval of the probability, by Student's t of its logarithm. docs/theory/rare_events.md, (B7)."""
+        """The interval of the probability, by Student's t for its logarithm. docs/theory/rare_events.md, (B7)."""
         from scipy.stats import t
 
         # No answer is surer than one member of all that were run.
@@ -107,12 +107,12 @@ class RareAnswer:
 
 
 def joined(runs: Sequence[SubsetRun]) -> tuple[float, float, float]:
-    """(probability, spread of its relative error, degrees of freedom) of independent runs, weighed by their sizes.
+    """Join independent runs, weighted by their sizes: (probability, its relative error, degrees of freedom).
 
     docs/theory/rare_events.md, (B6).
 
-    The spread is that of the runs about each other, beside what their own chains say; where the runs differ more than chains
-    explain, that of the runs alone.
+    The error combines the scatter of the runs with the errors that their own chains estimate. If the runs differ more
+    than the chains explain, only the scatter counts.
     """
     from scipy.stats import f
 
@@ -130,11 +130,11 @@ def joined(runs: Sequence[SubsetRun]) -> tuple[float, float, float]:
 
 
 class Groups(dict[int, list[SubsetRun]]):
-    """Runs of chains to each condition that they reach, by its place."""
+    """Runs of chains, by the index of the condition that they reach."""
 
 
 def united(groups: Groups) -> tuple[float, float, float]:
-    """(probability, spread of its relative error, degrees of freedom) that any condition holds.
+    """Probability that any condition holds: (probability, its relative error, degrees of freedom).
 
     docs/theory/rare_events.md, (B15).
     """
@@ -149,26 +149,26 @@ def united(groups: Groups) -> tuple[float, float, float]:
 
 
 def portions(shares: np.ndarray) -> np.ndarray:
-    """Parts of the draws for groups with these shares of the event: half by the shares, half evenly."""
+    """Fractions of the draws for groups with these shares of the event: half by the shares, half evenly."""
     return np.asarray(0.5 * shares / max(shares.sum(), 1e-300) + 0.5 / len(shares)) if len(shares) > 1 else np.ones(1)
 
 
 def spread_over(fits: Sequence[Mixture], shares: np.ndarray) -> Mixture:
-    """One mixture of those of all groups."""
+    """Join the mixtures of all groups to one."""
     return together(fits, portions(shares))
 
 
 def beyond(seen: Witness, probability: float, spread: float) -> bool:
-    """Whether a second look gives more than this probability, beyond what chance explains."""
+    """True if a second look gives a significantly larger probability."""
     return seen.probability > 0.0 and math.log(seen.probability / max(probability, 1e-300)) > AGREEMENT * math.hypot(
         seen.spread, min(spread, 1.0)
     )
 
 
 def unseen(share: float, count: float) -> float:
-    """Root mean square of the part of an event that weights do not see. docs/theory/rare_events.md, (B18).
+    """Root mean square of the fraction of an event that the weights miss. docs/theory/rare_events.md, (B18).
 
-    share: of the second look's independent members where the mixture hardly draws. count: of these, 0 where it met none.
+    share: fraction of the second look's independent members where the mixture hardly draws. count: their number, or 0.
     """
     odd = share * count
     return math.sqrt((odd + 1.0) * (odd + 2.0) / ((count + 2.0) * (count + 3.0))) if count else 0.0
@@ -191,7 +191,7 @@ def _of_runs(groups: Groups) -> FailingGroup:
 
 
 class FailingGroup(NamedTuple):
-    """Failing members: u (m, d), limits by condition (k, m), and (m,) each weights, chains, ancestors, independent parts."""
+    """Failing members: u (m, d), rows: limits by condition (k, m); weights, chains, ancestors, independent parts (m,)."""
 
     u: np.ndarray
     rows: np.ndarray
@@ -202,7 +202,7 @@ class FailingGroup(NamedTuple):
 
     @classmethod
     def alone(cls, u: np.ndarray, rows: np.ndarray, weights: np.ndarray) -> FailingGroup:
-        """Members of which none is related to another."""
+        """Members that are all independent."""
         own = np.arange(len(u))
         return cls(u, rows, weights, own, own, own % RUNS)
 
@@ -211,10 +211,10 @@ class FailingGroup(NamedTuple):
 class RareSearch:
     """A search for the probability that any of k limits of d standard normals is above 0.
 
-    limit: the one that the answer is of, (n, d) -> (n,) or (k, n); NaN is a member that failed, which counts as the event.
-    chained: the one that first chains go by, itself by default. margin: how far from failure by `chained` a member of the
-    event may be. weighted: whether weights may be the answer. most: members that may be run. report: called with the
-    fraction of the work that is done. witness: the limit as the second look asks it, itself by default.
+    limit: the limit of the answer, (n, d) -> (n,) or (k, n); NaN is a failed member, which counts as the event.
+    chained: the limit of the first chains; default `limit`. margin: largest distance from failure in `chained` of a
+    member of the event. weighted: True if importance sampling may give the answer. most: number of members that may be
+    run. report: called with the completed fraction of the work. witness: the limit of the second look; default `limit`.
     """
 
     limit: Limit
@@ -237,7 +237,7 @@ class RareSearch:
     _looks: list[Witness] = field(default_factory=list)
 
     def answer(self) -> RareAnswer:
-        """The probability. Raises NoProgress."""
+        """Find the probability. Raises NoProgress."""
         found = self._answer()
         self.report(1.0)
         return found
@@ -271,12 +271,12 @@ class RareSearch:
         self.report(self._fraction)
 
     def _rows(self, u: np.ndarray, limit: Limit | None = None) -> np.ndarray:
-        """The limits by each condition (k, n); those of members that failed are infinite."""
+        """The limits for each condition (k, n); infinite for failed members."""
         rows = np.atleast_2d((limit or self.limit)(u))
         return np.where(np.isnan(rows), np.inf, rows)
 
     def _first(self) -> tuple[Groups, NoProgress | None]:
-        """First runs of chains to each condition that they reach; and why they do not reach another."""
+        """First runs of chains to each condition that they reach, and the reason if one is not reached."""
         limit, stuck, groups = self.chained or self.limit, None, Groups()
         generators = [generator(self.seed, "rare chains", 0, run) for run in range(RUNS)]
         u = np.concatenate([rng.standard_normal((FIRST_SIZE, self.d)) for rng in generators])
@@ -295,11 +295,11 @@ class RareSearch:
         return groups, stuck
 
     def _row(self, i: int, limit: Limit) -> Limit:
-        """The limit of one condition alone."""
+        """The limit of a single condition."""
         return lambda u: np.asarray(self._rows(u, limit)[i])
 
     def climbed(self, round_: int, size: int, i: int, count: int) -> list[SubsetRun]:
-        """Independent runs of chains to the condition i of so many."""
+        """Independent runs of chains to condition i of `count` conditions."""
         generators = [generator(self.seed, "rare chains", round_, run, *[i] * bool(i)) for run in range(RUNS)]
         u = np.concatenate([rng.standard_normal((size, self.d)) for rng in generators])
         own = self._row(i, self.limit) if self.chained is None else self._gated
@@ -308,7 +308,7 @@ class RareSearch:
         return self._parted(climb(own, levels, generators, self._ran), count)
 
     def _parted(self, runs: list[SubsetRun], count: int) -> list[SubsetRun]:
-        """Runs to one condition of so many; a member that m of these count is an m-th of the event in each.
+        """Runs to one of `count` conditions; a member that meets m of them counts 1 / m in each.
 
         docs/theory/rare_events.md, (B15).
         """
@@ -321,7 +321,7 @@ class RareSearch:
                 for run, own in zip(runs, each, strict=True)]  # fmt: skip
 
     def _witnessed(self, probability: float | None) -> Witness | None:
-        """Failing members that no level led to; None, and a note, where they would tell nothing."""
+        """Failing members found without levels; None, and a note, if they would not help."""
         if not self.weighted:
             return None
         if self.d > MOST_NORMALS:
@@ -341,9 +341,9 @@ class RareSearch:
         return seen
 
     def _refuted(self, seen: Witness, probability: float, spread: float) -> Witness | None:
-        """The second look, with others beside it, where all of them give more than this probability beyond chance.
+        """The second look, pooled with further ones, if together they give a significantly larger probability.
 
-        One look has the effect of a dozen members: alone it is too often far from the truth to decide.
+        One look is worth only about a dozen members, so a single look is too inaccurate to decide.
         """
         if beyond(seen, probability, spread):
             while len(self._looks) < MORE_LOOKS and self.members + self._cost <= self.most:
@@ -358,7 +358,7 @@ class RareSearch:
         return np.asarray((rows > 0.0).any(axis=0))
 
     def plain(self, probability: float, groups: Groups) -> RareAnswer:
-        """Plain sampling, of what is not rare; chains go on from those of these runs where it meets none.
+        """Plain sampling of an event that is not rare; if no member meets the event, more chains are run.
 
         docs/theory/rare_events.md, (B2).
         """
@@ -376,7 +376,7 @@ class RareSearch:
     def _answer_of(
         self, estimator: str, reported: tuple[float, float, float], members: FailingGroup, runs: Sequence[SubsetRun] = (),
         bounds: tuple[float, float] | None = None) -> RareAnswer:  # fmt: skip
-        """The answer; members that chains repeat are one, with the weights of all."""
+        """Build the answer; members that chains repeat are merged, and their weights are added."""
         distinct, first, place = np.unique(members.u, axis=0, return_index=True, return_inverse=True)
         weights, rows = np.bincount(place.reshape(-1), members.weights, len(distinct)), members.rows[:, first]
         return RareAnswer(
@@ -385,9 +385,9 @@ class RareSearch:
         )  # fmt: skip
 
     def importance(self, groups: Groups, chains: tuple[float, float] | None, seen: Witness) -> RareAnswer | None:
-        """Weights of members drawn about the failing ones of all runs; None where they are not the answer.
+        """Importance sampling about the failing members of all runs; None if its answer fails the checks.
 
-        chains: (probability, spread) of the chains, None where they did not arrive. seen: of the second look.
+        chains: (probability, spread) of the chains, None if they did not arrive. seen: result of the second look.
         """
         rng, runs = generator(self.seed, "rare mixture"), [run for each in groups.values() for run in each]
         points = [np.concatenate([run.failing for run in each]) for each in groups.values()]
@@ -451,7 +451,7 @@ class RareSearch:
     def _with_drawn(
         points: np.ndarray, result: WeightedMembers, belongs: np.ndarray, rng: np.random.Generator
     ) -> np.ndarray:
-        """Members of a group, and as many that were drawn and belong to it, as often as they weigh."""
+        """Members of a group, and as many drawn members that belong to it, resampled by their weights."""
         places = np.flatnonzero(belongs)
         if not result.weights[places].sum() > 0.0:
             return points
@@ -459,7 +459,7 @@ class RareSearch:
         return np.concatenate([points, result.failing[places[rng.choice(len(places), size=len(points), p=shares)]]])
 
     def _note_beside(self, probability: float) -> None:
-        """Say what part of the event chains did not come to, where it is no small one."""
+        """Note the fraction of the event that the chains missed, if it is not small."""
         if (part := self._beside[0] / probability) > LEAST_MISSED:
             self.notes.append(f"{part:.0%} of the probability is of a failure mode that the chains passed by: a second look "
                               "found it, and members were drawn there, too")  # fmt: skip
@@ -471,7 +471,7 @@ class RareSearch:
         return u, limits
 
     def subset(self, groups: Groups, seen: Witness | None = None) -> RareAnswer:
-        """Chains alone, of sizes chosen from those before; the first ones, which are small, serve the choice alone."""
+        """Answer by chains alone; the first runs, which are small, only serve to choose the sizes."""
         shares = {i: joined(first)[0] for i, first in groups.items()}
         count, total = max(len(first[0].rows) or 1 for first in groups.values()), sum(shares.values())
         # What is rarer may have a larger error: each takes its part of the whole at the least cost.
@@ -499,7 +499,7 @@ class RareSearch:
         )
 
     def _sized(self, i: int, first: Sequence[SubsetRun], error: float, count: int) -> list[SubsetRun]:
-        """Runs to the condition i that have this error, as far as members may be run; the first ones where none may."""
+        """Runs to condition i with this error, as far as `most` allows; the first runs if no more are allowed."""
         runs: list[SubsetRun] = []
         spread = RELATED * math.sqrt(sum(run.spread**2 for run in first)) / RUNS
         total, levels = RUNS * first[0].size, sum(run.members / run.size for run in first) / RUNS
@@ -524,7 +524,7 @@ class RareSearch:
         return runs or list(first)
 
     def _look_at_gate(self, failing: np.ndarray) -> None:
-        """Say so where members may fail that the cheap limit shuts out: some fail that it just lets in."""
+        """Note that the cheap limit may exclude failing members, if some fail near its margin."""
         if self.chained is None:
             return
         near = float((self.chained(failing) < -0.75 * self.margin).mean())
@@ -533,7 +533,7 @@ class RareSearch:
             self.notes.append(f"{problem}, so that more may be shut out: leave cheaper out, or name another")
 
     def _gated(self, u: np.ndarray, limit: Limit | None = None) -> np.ndarray:
-        """The limit where the cheap one is no further from failure than the margin, and elsewhere the cheap one."""
+        """The limit if the cheap limit is within the margin of failure, otherwise the cheap limit."""
         assert self.chained is not None
         limits = self.chained(u)
         near = limits > -self.margin

@@ -27,7 +27,7 @@ FEW_STARTS = 30
 
 @dataclass(frozen=True, eq=False)
 class SplitAnswer(RareAnswer):
-    """Answer of splitting; paths: of each failing member, as in `SplitRuns`; of_run: (m,), the independent run of each."""
+    """Answer of splitting; paths: as in `SplitRuns`; of_run: (m,), independent run of each failing member."""
 
     paths: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
     of_run: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
@@ -35,9 +35,9 @@ class SplitAnswer(RareAnswer):
 
 @dataclass(eq=False)
 class SplitSearch:
-    """A search for the probability of an event on the way of a walk.
+    """A search for the probability of an event during a walk.
 
-    walk: a Walk that counts its `members`. most: members that may be run, in whole runs.
+    walk: a Walk that counts its `members`. most: number of members that may be run, in whole runs.
     """
 
     walk: Any
@@ -49,7 +49,7 @@ class SplitSearch:
     _price: float = 1.0
 
     def answer(self) -> SplitAnswer:
-        """The probability. Raises NoProgress."""
+        """Find the probability. Raises NoProgress."""
         pilot = self._piloted()
         self.report(0.1)
         first = self._sized(RELATED * pilot.variance / (FIRST_ERROR * self.relative_error) ** 2)
@@ -71,7 +71,7 @@ class SplitSearch:
         return self._answer(rounds)
 
     def _piloted(self) -> LevelPilot:
-        """A pilot, larger ones where few members are left that come nearer. Raises NoProgress."""
+        """Run a pilot, and larger ones if too few members come nearer to the event. Raises NoProgress."""
         for attempt, size in enumerate(PILOTS):
             before = self.walk.members
             try:
@@ -86,7 +86,7 @@ class SplitSearch:
         raise AssertionError
 
     def _sized(self, wanted: float) -> int:
-        """Members of a level of each run, where so many are wanted of all."""
+        """Number of members of a level in each run, for a wanted total over all runs."""
         size = math.ceil(np.clip(wanted / RUNS, LEAST, LARGEST))
         afford = int((self.most - self.walk.members) / (RUNS * self._price))
         note = TAKES_MORE.format(self.most)
@@ -128,14 +128,14 @@ class SplitSearch:
 
 
 def different(rows: np.ndarray, weights: np.ndarray) -> float:
-    """The effective number of different rows (n, d): 1 over the sum of the squares of their shares (Kish 1965)."""
+    """The effective number of different rows (n, d): 1 divided by the sum of their squared shares (Kish 1965)."""
     _, place = np.unique(rows, axis=0, return_inverse=True)
     share = np.bincount(np.ravel(place), weights=weights)
     return float(1.0 / np.sum(share**2)) if len(share) else 0.0
 
 
 def joined_spread(runs: Sequence[SubsetRun]) -> tuple[float, float]:
-    """(probability, spread of its relative error) of independent runs, weighed by their sizes; by these runs alone."""
+    """Join independent runs, weighted by their sizes: (probability, its relative error from the scatter of the runs)."""
     sizes = np.array([run.size for run in runs], float)
     probabilities = np.array([run.probability for run in runs])
     probability = float(sizes @ probabilities / sizes.sum())

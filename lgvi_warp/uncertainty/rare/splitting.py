@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Splitting in time: members that come near the event are copied there, and the copies go on with noise of their own.
+"""Splitting in time: members that come near the event are copied, and the copies continue with their own noise.
 
-Fixed effort (Garvels 2000): at each level so many members go from where others reached the level before, until they reach it
-or the time is over. Levels come from a pilot; the runs that answer have fixed levels, so that their mean is right however
-coarse the looks are (Cerou, Del Moral, Furon & Guyader 2012).
+Fixed effort (Garvels 2000): for each level, a fixed number of members start from states in which others reached the
+level before, and run until they reach the level or the time is over. A pilot chooses the levels. The main runs have
+fixed levels, so their mean is unbiased however coarse the checkpoints are (Cerou, Del Moral, Furon & Guyader 2012).
 """
 
 from __future__ import annotations
@@ -32,7 +32,8 @@ MOVES, ACCEPTANCE = 2, 0.44
 class LevelPilot:
     """Answer of a small run with adaptive levels.
 
-    bounds: (m,), of the score; shares: (m + 1,), of members that go on; steps: (m, d), of their starts at each bound.
+    bounds: (m,), levels of the score; shares: (m + 1,), fractions of members that continue; steps: (m, d), Metropolis
+        steps of the starts at each bound.
     """
 
     score: Score
@@ -47,12 +48,12 @@ class LevelPilot:
 
     @property
     def variance(self) -> float:
-        """Variance of the relative error of a run with one member a level, if members of a level were independent."""
+        """Variance of the relative error of a run with one member per level, if members of a level were independent."""
         return float(((1.0 - self.shares) / self.shares).sum())
 
 
 def piloted(walk: Walk, size: int, rng: np.random.Generator) -> LevelPilot:
-    """Go to the event level by level, each reached by a fifth of the members of the one before. Raises NoProgress."""
+    """Approach the event by levels, each reached by a fifth of the members of the level before. Raises NoProgress."""
     stage: Stage | None = Stage.first(walk, rng.standard_normal((size, walk.d)), np.zeros(size, int))
     score: Score | None = None
     bounds: list[float] = []
@@ -87,7 +88,7 @@ def piloted(walk: Walk, size: int, rng: np.random.Generator) -> LevelPilot:
 
 
 def _last_distances(log: Log, size: int) -> np.ndarray:
-    """The distances (c, n) of each member when it was last seen."""
+    """The distances (c, n) of each member at its last checkpoint."""
     distances = np.empty((len(log[0][1].distances), size))
     for rows, flock in log:
         distances[:, rows] = flock.distances
@@ -95,7 +96,7 @@ def _last_distances(log: Log, size: int) -> np.ndarray:
 
 
 def _next_bound(reach: np.ndarray, bounds: Sequence[float]) -> float | None:
-    """The next level's bound, reached by about a fifth; None where scores lead no further. Raises NoProgress."""
+    """The next level's bound, reached by about a fifth; None if scores lead no further. Raises NoProgress."""
     finite = np.sort(reach[np.isfinite(reach)])
     happened = (reach == math.inf).sum()
     values, first = np.unique(finite, return_index=True)
@@ -115,9 +116,9 @@ def _next_bound(reach: np.ndarray, bounds: Sequence[float]) -> float | None:
 class SplitRuns:
     """Independent runs with fixed levels.
 
-    runs: one each. failing: (m, d), normals at the start of members for which the event happens. limits: (m,), theirs.
-    weights: (m,), probabilities. paths: for each of them (looks (k,), keys (k,)), from which look on it has which noise.
-    rows: (c, m), their limits by each condition at the last look. of_run: (m,), the run of each.
+    runs: the runs. failing: (m, d), starting normals of members for which the event happens. limits: (m,), their limits.
+    weights: (m,), probabilities. paths: for each failing member, checkpoints (k + 1,) and keys (k,) of noise between them.
+    rows: (c, m), limits for each condition at the last checkpoint. of_run: (m,), run of each failing member.
     """
 
     runs: tuple[SubsetRun, ...]
@@ -132,11 +133,11 @@ class SplitRuns:
 def split_runs(
     walk: Walk, pilot: LevelPilot, size: int, generators: Sequence[np.random.Generator],
     report: Callable[[float], None] = lambda fraction: None) -> SplitRuns:  # fmt: skip
-    """Independent runs of so many members a level, with the levels and the score of a pilot, all of them in one batch.
+    """Independent runs with `size` members per level, by the levels and the score of a pilot, all in one batch.
 
     docs/theory/rare_events.md, (B11).
 
-    report: called with the part of the levels that are done.
+    report: called with the completed fraction of the levels.
     """
     count = len(generators)
     u = np.concatenate([rng.standard_normal((size, walk.d)) for rng in generators])
@@ -160,9 +161,9 @@ def split_runs(
 
 
 def at_the_end(walk: Walk, flock: Flock) -> np.ndarray:
-    """The limits by each condition (c, n) at the last look of members for which the event happened; infinite for lost ones.
+    """Limits for each condition (c, n) at the last checkpoint, of members with the event; infinite for failed members.
 
-    Where there are several conditions, members go on to the end, with noise of their own: another one may hold later.
+    With several conditions, members continue to the end with their own noise: another condition may hold later.
     """
     rows = np.where(flock.lost, np.inf, flock.distances)
     if len(rows) == 1:
@@ -178,7 +179,7 @@ def at_the_end(walk: Walk, flock: Flock) -> np.ndarray:
 
 
 def _run_of(run: int, levels: Sequence[Stage], bounds: Sequence[float], size: int) -> SubsetRun:
-    """One of several runs: its shares, and the scores of each level's members. docs/theory/rare_events.md, (B11)."""
+    """Shares of one of several runs, and scores of each level's members. docs/theory/rare_events.md, (B11)."""
     reaches = [stage.reach[stage.run == run] for stage in levels]
     shares = [float((reach >= bound).mean()) for reach, bound in zip(reaches, bounds, strict=False) if len(reach)]
     probability = float(np.prod(shares)) if len(shares) == len(bounds) else 0.0
@@ -192,7 +193,7 @@ def _run_of(run: int, levels: Sequence[Stage], bounds: Sequence[float], size: in
 def _with_failing(
     runs: tuple[SubsetRun, ...], stages: Sequence[Stage], arrived: AtLook, ends: Mapping[int, np.ndarray], score: Score
 ) -> SplitRuns:
-    """The runs with the members for which the event happened, each once, whose path may have been copied."""
+    """The runs with the members for which the event happened; copies of a path are merged."""
     weights: dict[tuple[int, int], float] = {}
     limits: dict[tuple[int, int], float] = {}
     looks: dict[tuple[int, int], int] = {}
@@ -224,7 +225,7 @@ def _with_failing(
 
 
 def _path(stages: Sequence[Stage], level: int, row: int, end: int) -> tuple[np.ndarray, np.ndarray]:
-    """(looks (k + 1,), keys (k,)): from each look to the next the member has the noise of a key."""
+    """Path of a member: checkpoints (k + 1,), and keys (k,) of the noise between successive checkpoints."""
     looks, keys = [end], []
     while level >= 0:
         begin = int(stages[level].look[row])

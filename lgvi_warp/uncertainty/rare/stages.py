@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Members of one level of splitting in time, and how they go until they reach the next."""
+"""Members of one level of splitting in time, and their advance to the next level."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ Log = list[tuple[np.ndarray, Flock]]
 
 @dataclass(frozen=True, eq=False)
 class Stage:
-    """The members that go from one level to the next.
+    """Members that start at one level and run to the next.
 
-    run: (n,), the independent run that each belongs to. u: (n, d), its normals at the start. parent: (n,), its row in the
-    stage before, -1 at the start. look: (n,), from where it has the noise of its key (n,). before: (n,), its score where it
-    begins; reach: (n,), the largest on its way, infinite where the event happened. entrants: (rows, flock) by the look where
-    they begin. moved: (n,), whether its start is no longer that of its parent.
+    run: (n,), the independent run of each member. u: (n, d), its normals at the start. parent: (n,), its row in the
+    stage before, -1 at the start. look: (n,), checkpoint at which it begins with the noise of its key (n,). before:
+    (n,), its score there; reach: (n,), its largest score so far, infinite if the event happened. entrants: checkpoint
+    -> (rows, flock) of members that begin there. moved: (n,), True if its start differs from its parent's.
     """
 
     run: np.ndarray
@@ -45,9 +45,9 @@ class Stage:
                    np.zeros(n, bool))  # fmt: skip
 
     def next(self, walk: Walk, crossed: AtLook, size: int, generators: Sequence[np.random.Generator]) -> Stage | None:
-        """So many members of each run, from where members of this stage crossed a level; None where no run has any.
+        """Draw `size` members of each run from states at which members of this stage crossed a level, or None.
 
-        Each comes equally often, but for one (systematic resampling).
+        Each state is drawn equally often, up to one (systematic resampling).
         """
         looks = np.concatenate([np.full(len(rows), look) for look, (rows, _) in crossed.items()] or [np.zeros(0, int)])
         rows = np.concatenate([rows for rows, _ in crossed.values()] or [np.zeros(0, int)])
@@ -73,10 +73,10 @@ class Stage:
 def walked(
     walk: Walk, score: Score | None, stage: Stage, bound: float, log: Log | None = None,
     keys: Callable[[int], np.ndarray] | None = None) -> AtLook:  # fmt: skip
-    """Let the members of a stage go until they reach a bound of the score; (rows, flock) by look of those that do.
+    """Run the members of a stage until they reach a bound of the score; returns checkpoint -> (rows, flock) of those.
 
-    score: None where nothing but the event itself is known. log: takes every look at every member. keys: of their noise (n,)
-    from a look to the next, by default those of the stage. A walk that keeps its stretches goes none twice.
+    score: None if only the event itself is known. log: receives all members at every checkpoint. keys: function of a
+    checkpoint that gives keys (n,) of the noise, by default the stage's. A walk with a store of stretches repeats none.
     """
     if log is None and walk.stretches is not None:
         return walk.stretches(walk, stage, bound, lambda: _walked(walk, score, stage, bound, None, keys))
@@ -86,7 +86,7 @@ def walked(
 def _walked(
     walk: Walk, score: Score | None, stage: Stage, bound: float, log: Log | None,
     keys: Callable[[int], np.ndarray] | None) -> AtLook:  # fmt: skip
-    """Go."""
+    """Run without the store."""
     crossed: dict[int, list[tuple[np.ndarray, Flock]]] = {}
     moving: tuple[np.ndarray, Flock] | None = None
     for look in range(walk.looks + 1):
@@ -109,7 +109,7 @@ def _walked(
 
 
 def first_reached(walk: Walk, score: Score, stage: Stage, log: Log, bound: float) -> AtLook:
-    """First states of members of a stage at a bound, from all looks at them."""
+    """First states of a stage's members at a bound, from their log."""
     crossed: dict[int, list[tuple[np.ndarray, Flock]]] = {}
     reached = stage.before >= bound
     for look, (rows, flock) in stage.entrants.items():
@@ -122,7 +122,7 @@ def first_reached(walk: Walk, score: Score, stage: Stage, log: Log, bound: float
 
 
 def note(crossed: dict[int, Log], look: int, rows: np.ndarray, flock: Flock, chosen: np.ndarray) -> None:
-    """Note the chosen ones of members that reached a level at a look."""
+    """Record the chosen members that reached a level at a checkpoint."""
     part = _part(rows, flock, chosen)
     if part is not None:
         crossed.setdefault(look, []).append(part)
@@ -144,7 +144,7 @@ def _together(
 
 
 def by_look(walk: Walk, crossed: Mapping[int, Log]) -> AtLook:
-    """Members that were noted, those of one look together."""
+    """Recorded members, joined by checkpoint."""
     return {
         look: (np.concatenate([rows for rows, _ in parts]), walk.joined([flock for _, flock in parts]))
         for look, parts in sorted(crossed.items())

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Stretches of a walk, from level to level, kept in a folder: a call that was interrupted goes on after the last one."""
+"""Store of a walk's stretches from level to level in a folder: an interrupted call continues after the last stretch."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ PARAMETER = "parameter."
 
 
 class Stretches:
-    """Stretches of a walk that a folder keeps, run or read back."""
+    """Stretches of a walk, run and stored in a folder, or read from it."""
 
     def __init__(self, remembered: Remembered):
         self._remembered = remembered
 
     def __call__(self, walk: Any, stage: Stage, bound: float, go: Callable[[], AtLook]) -> AtLook:
-        """The members that reach a bound, by look; what the walk and the stage note of the way is as if they had gone."""
+        """Members that reach a bound, by checkpoint; a stored stretch updates walk and stage like a run."""
         steps, seconds = walk.steps_run, walk.seconds
 
         def arrays(*_: np.ndarray) -> tuple[np.ndarray, ...]:
@@ -53,7 +53,7 @@ class Stretches:
 
 
 def arrays_of(flock: Flock) -> dict[str, np.ndarray]:
-    """Members at a look after the start as arrays by name."""
+    """Convert members at a checkpoint after the start to arrays by name."""
     place: Final = flock.place
     numbers = json.dumps({name: getattr(place, name) for name in NUMBERS})
     parameters = {f"{PARAMETER}{name}": np.asarray(each) for name, each in place.parameters.items()}
@@ -63,7 +63,7 @@ def arrays_of(flock: Flock) -> dict[str, np.ndarray]:
 
 
 def flock_of(look: int, arrays: dict[str, np.ndarray]) -> Flock:
-    """Members at a look from what `arrays_of` gave."""
+    """Build members at a checkpoint from the arrays of `arrays_of`."""
     parameters = {name.removeprefix(PARAMETER): each for name, each in arrays.items() if name.startswith(PARAMETER)}
     place = Final.from_arrays(arrays, parsed(str(arrays["numbers"])), parameters)
     return Flock(look, place, **{name: arrays[name] for name in AXES})

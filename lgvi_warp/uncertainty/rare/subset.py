@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Subset simulation: the probability that a limit function of standard normals is above 0, however small (Au & Beck 2001).
 
-Several independent runs go level by level in step, so that the chains of all of them are one batch of the limit function.
+Several independent runs advance by levels together, so that all their chains form one batch of the limit function.
 """
 
 from __future__ import annotations
@@ -30,10 +30,9 @@ FEWEST_SEEDS = 10
 
 
 class NoProgress(Exception):  # noqa: N818  (what happened, and no fault of the program)
-    """The levels do not come nearer to the event.
+    """Raised if the levels come no nearer to the event.
 
-    kind: "steps" where the limit has few values, "never" where the event is rarer than can be looked for. largest: the largest
-    limit that was seen.
+    kind: "steps" if the limit takes few values, "never" if the event is too rare. largest: the largest limit so far.
     """
 
     def __init__(self, kind: str, largest: float):
@@ -43,10 +42,10 @@ class NoProgress(Exception):  # noqa: N818  (what happened, and no fault of the 
 
 @dataclass(frozen=True, eq=False)
 class ChainLevel:
-    """The members of one level, all of whose limits are at the threshold or above it.
+    """The members of one level; all their limits are at or above the threshold.
 
-    u: (n, d), chain by chain. limits: (n,). chains: number of them; n where the members are independent. threshold: -inf for
-    the first level. log_probability: of being here. variance: of the relative error so far, as the chains themselves say it.
+    u: (n, d), chain by chain. limits: (n,). chains: number of chains; n if the members are independent. threshold: -inf for
+    the first level. log_probability: logarithm of the level's probability. variance: of its relative error, by the chains.
     """
 
     u: np.ndarray
@@ -63,19 +62,19 @@ class SubsetRun:
     """One run of subset simulation.
 
     Attributes:
-        probability: of the event.
-        spread: standard deviation of its relative error, as the run's own chains say it, which is less than there is.
-        thresholds: (k,), the limit from which on each level's members are; the first is -inf.
-        limits: for each level, the limits of its members (n,).
-        acceptance: (k,), the part of the chains' proposals that was accepted at each level.
+        probability: probability of the event.
+        spread: standard deviation of its relative error, estimated from the run's own chains, which is too small.
+        thresholds: (k,), the smallest limit allowed at each level; the first is -inf.
+        limits: limits (n,) of the members of each level.
+        acceptance: (k,), fraction of the chains' proposals that were accepted at each level.
         failing: (m, d), the standard normals of the last level's members for which the event happens.
-        failing_limits: (m,), their limits.
+        failing_limits: (m,), limits of the failing members.
         size: number of members of a level.
         members: number of members that were run.
         failing_chains: (m,), the chain of each of the failing members.
-        failing_ancestors: (m,), the member of the first level from which each descends.
-        parts: (m,), where several conditions make the event, one over the number of these that each failing member fulfils.
-        rows: (k, m), limits of the failing members by each condition; none where there is one.
+        failing_ancestors: (m,), the member of the first level from which each failing member descends.
+        parts: (m,), for several conditions: 1 / number of conditions that each failing member fulfils.
+        rows: (k, m), limits of the failing members for each condition; empty for a single condition.
     """
 
     probability: float
@@ -94,13 +93,13 @@ class SubsetRun:
 
     @property
     def share(self) -> float:
-        """Probability of the event, as far as it is that of this condition: members that several fulfil count in parts."""
+        """Share of this condition in the event's probability: members that fulfil several conditions count in parts."""
         return self.probability * (float(self.parts.mean()) if len(self.parts) else 1.0)
 
 
 @dataclass(eq=False)
 class _Climber:
-    """A run under way: its levels, of which the normals of the last alone are kept."""
+    """A run in progress: its levels; only the last level keeps its normals."""
 
     rng: np.random.Generator
     level: ChainLevel
@@ -114,7 +113,7 @@ class _Climber:
 
     @property
     def arrived(self) -> bool:
-        """Whether the event is no rare one any more among the members of this level."""
+        """True if the event is no longer rare among the members of this level."""
         return int((self.level.limits > 0.0).sum()) >= self.seeds
 
     @property
@@ -123,7 +122,7 @@ class _Climber:
         return max(1, round(SHARE * self.size))
 
     def threshold(self) -> float:
-        """The next threshold, that a tenth of the members reach. Raises NoProgress."""
+        """The next threshold, which a tenth of the members reach. Raises NoProgress."""
         limits = self.level.limits
         bound, farthest = min(0.0, float(np.partition(limits, -self.seeds)[-self.seeds])), -np.finfo(float).max
         if bound <= farthest and (limits > farthest).sum() >= FEWEST_SEEDS:
@@ -141,7 +140,7 @@ class _Climber:
         return bound
 
     def begin(self) -> None:
-        """Begin chains at members that reach the next threshold."""
+        """Start chains at members that reach the next threshold."""
         level, bound = self.level, self.threshold()
         inside = np.flatnonzero(level.limits >= bound)
         chosen = np.resize(self.rng.permutation(inside), self.seeds)
@@ -154,7 +153,7 @@ class _Climber:
         self._accepted, self._steps = 0.0, 0
 
     def step_as(self, others: Sequence[_Climber]) -> None:
-        """Take the widths of steps from other runs, if there are any: widths by a run's own members would pull it there."""
+        """Take the step widths from other runs, if there are any, since widths from a run's own members would bias it."""
         runs = [run.inside for run in others if run is not self]
         if runs:
             self._widths = np.clip(np.concatenate(runs).std(axis=0), 1e-3, 1.0)
@@ -162,7 +161,7 @@ class _Climber:
             self._widths = widths_of(self.inside, len(np.unique(self.of)))
 
     def proposals(self) -> np.ndarray:
-        """The next places of all chains: each keeps the standard normal law (Papaioannou et al. 2015).
+        """Proposals of all chains, which preserve the standard normal distribution (Papaioannou et al. 2015).
 
         docs/theory/rare_events.md, (B4).
         """
@@ -170,7 +169,7 @@ class _Climber:
         return np.sqrt(1.0 - step**2) * u + step * self.rng.standard_normal(u.shape)
 
     def take(self, places: np.ndarray, limits: np.ndarray) -> None:
-        """Move the chains whose new places reach the threshold, and steer the step by how many did."""
+        """Move the chains whose proposals reach the threshold, and adapt the step to the acceptance."""
         accepted = limits >= self._next.threshold
         self._u.append(np.where(accepted[:, None], places, self._u[-1]))
         self._limits.append(np.where(accepted, limits, self._limits[-1]))
@@ -180,14 +179,14 @@ class _Climber:
         self.members += len(limits)
 
     def end(self) -> None:
-        """Go to the level that the chains have filled."""
+        """Make the chains' members the current level."""
         self.below.append(replace(self.level, u=self.level.u[:0]))
         u, limits = np.stack(self._u, axis=1), np.stack(self._limits, axis=1)
         acceptance, self.ancestors = self._accepted / max(1, self._steps), np.repeat(self._ancestors, u.shape[1])
         self.level = replace(self._next, u=u.reshape(-1, u.shape[2]), limits=limits.ravel(), acceptance=acceptance)
 
     def result(self) -> SubsetRun:
-        """The run, which has arrived."""
+        """The finished run."""
         level, levels = self.level, [*self.below, self.level]
         happens = level.limits > 0.0
         return SubsetRun(
@@ -206,7 +205,7 @@ class _Climber:
 
 
 def widths_of(u: np.ndarray, count: int) -> np.ndarray:
-    """Widths of steps (d,): numbers that the event narrows get steps as narrow; u: (n, d), of so many independent members.
+    """Step widths (d,): normals that the event narrows get narrow steps; u: (n, d), from `count` independent members.
 
     docs/theory/rare_events.md, (B4).
     """
@@ -218,7 +217,7 @@ def widths_of(u: np.ndarray, count: int) -> np.ndarray:
 
 
 def share_variance(happens: np.ndarray, chains: int) -> float:
-    """Variance of the relative error of a share, of members (n,) chain by chain: from the spread of the chains' own shares.
+    """Variance of a share's relative error, of members (n,) chain by chain: from the scatter of the chains' own shares.
 
     docs/theory/rare_events.md, (B5).
     """
@@ -230,14 +229,14 @@ def share_variance(happens: np.ndarray, chains: int) -> float:
 
 
 def levels_of(u: np.ndarray, limits: np.ndarray, size: int) -> list[ChainLevel]:
-    """First levels of several runs from the members of all."""
+    """First levels of several runs, from the members of all runs."""
     return [ChainLevel(u[i : i + size], limits[i : i + size], size) for i in range(0, len(u), size)]
 
 
 def climb(
     limit: Limit, levels: Sequence[ChainLevel], generators: Sequence[np.random.Generator],
     report: Callable[[int], None] = lambda members: None) -> list[SubsetRun]:  # fmt: skip
-    """Go from levels that there are to the event, every run by itself, all chains in one batch.
+    """Subset simulation from given first levels to the event: independent runs, all chains in one batch.
 
     docs/theory/rare_events.md, (B3).
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A scene as a walk from look to look: each piece goes on from where members are, with noise of its own."""
+"""A scene as a walk from checkpoint to checkpoint: each interval continues the members' states with its own noise."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from lgvi_warp.uncertainty.rare.stretches import Stretches
 
 @dataclass(frozen=True, eq=False)
 class AtStart:
-    """Standard normals (n, d) of members that have not begun."""
+    """Standard normals (n, d) of members before the start."""
 
     u: np.ndarray
 
@@ -43,16 +43,16 @@ class AtStart:
 class VehicleWalk(Varying):
     """A scene as a Walk.
 
-    fleet: the scene and what varies. condition: the event. settings: of `prepare`. refuse: whether a member that fails is an
-    error; else it is the event. seed: of the noise. looks: into how many pieces the time is cut, at most. remembered: where
-    the way from level to level is kept.
+    fleet: the scene and its distributions. condition: the event. settings: arguments of `prepare`. refuse: True if a
+    failed member is an error, False if it is the event. seed: seed of the noise. looks: maximum number of time
+    intervals. remembered: store of the runs from level to level.
 
     Attributes:
-        lasting: as of a Walk.
-        steps: (looks,), steps of each piece.
+        lasting: as in `Walk`.
+        steps: (looks,), number of steps of each interval.
         h: step [s].
-        seconds: how long pieces took [s].
-        steps_run: steps of all members that were run.
+        seconds: time of the runs of intervals [s].
+        steps_run: number of steps that were run, over all members.
     """
 
     sources: tuple[Any, ...] = ()
@@ -84,7 +84,7 @@ class VehicleWalk(Varying):
         self._fresh, self.steps_run, self.seconds = 0, 0, 0.0
 
     def _unit(self, save: Any) -> int:
-        """The steps by which pieces begin: at samples, and at ticks of a controller."""
+        """Number of steps of which intervals are multiples, so that they begin at samples and ticks of a controller."""
         scene = self.fleet.scene
         every = [] if save.every is None else [save.every]
         if scene.controller is not None:
@@ -92,7 +92,7 @@ class VehicleWalk(Varying):
         return math.lcm(*(max(1, round(float(each) / self.h)) for each in every)) if every else 1
 
     def _run(self, steps: int) -> Prepared:
-        """The run of so many steps."""
+        """The prepared run of this number of steps."""
         if steps not in self._runs:
             length = float(steps * of_step(self.h))
             settings, save = dict(self._settings), self._settings["save"]
@@ -104,12 +104,12 @@ class VehicleWalk(Varying):
 
     @property
     def looks(self) -> int:
-        """Number of the last look."""
+        """Number of the last checkpoint."""
         return len(self.steps)
 
     @property
     def times(self) -> np.ndarray:
-        """Times of the looks (looks + 1,) [s]."""
+        """Times of the checkpoints (looks + 1,) [s]."""
         return np.concatenate([[0], np.cumsum(self.steps)]) * self.h
 
     @property
@@ -119,7 +119,7 @@ class VehicleWalk(Varying):
 
     @property
     def members(self) -> int:
-        """Members that were run, in whole runs."""
+        """Number of members that were run, in whole runs."""
         return math.ceil(self.steps_run / self.steps.sum())
 
     def begin(self, u: np.ndarray) -> Flock:
@@ -129,12 +129,12 @@ class VehicleWalk(Varying):
         return Flock(0, AtStart(u), np.full((c, n), np.nan), np.full((c, n), -SURE), np.zeros((n, 0)), no, no, no)
 
     def keys(self, count: int) -> np.ndarray:
-        """Keys (n,) of noise that no member has had."""
+        """Keys (n,) of noise that no member has used."""
         self._fresh += count
         return np.arange(self._fresh - count, self._fresh)
 
     def advance(self, flock: Flock, keys: np.ndarray) -> Flock:
-        """The members at the next look, with the noise of these keys."""
+        """Advance the members to the next checkpoint, with the noise of these keys."""
         began = time.perf_counter()
         steps = int(self.steps[flock.look])
         run = self._run(steps)
@@ -151,7 +151,7 @@ class VehicleWalk(Varying):
         return there
 
     def _flock(self, before: Flock, result: Any) -> Flock:
-        """The members after a piece."""
+        """The members after an interval."""
         status = np.asarray(result.status)
         if self._of is not None:
             pieces = [self._of.values(result)]
@@ -180,7 +180,7 @@ class VehicleWalk(Varying):
         return Flock(look, result.final, np.stack(values), distances, features, happened, over | lost, lost)
 
     def joined(self, flocks: Sequence[Flock]) -> Flock:
-        """Flocks of one look as one."""
+        """Join flocks at one checkpoint."""
         if len(flocks) == 1:
             return flocks[0]
         places = [flock.place for flock in flocks]
@@ -193,7 +193,7 @@ class VehicleWalk(Varying):
 
 
 def pieces(steps: int, unit: int, looks: int) -> np.ndarray:
-    """The steps of each piece: at most so many pieces of whole units, the last with what is left."""
+    """Steps of each interval: at most `looks` intervals of whole units; the last takes the remainder."""
     size = unit * max(1, -(-steps // (unit * looks)))
     whole, rest = divmod(steps, size)
     return np.array([size] * whole + ([rest] if rest else []), dtype=np.int64)

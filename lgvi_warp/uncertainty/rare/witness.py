@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A second look for ways to fail that chains did not see: it asks only whether members fail, and not how near they are to it.
+"""A second look for failure modes that chains missed: it only uses whether members fail, not how near they are to failure.
 
-Members are drawn with all spreads enlarged; those that fail are carried back to the nominal spreads in stages (sequential
-importance sampling, Papaioannou, Papadimitriou & Straub 2016). No level leads, so that no level can lead past a failure mode.
-Stages tell a probability, and their members soon descend from few of the wide ones. Each wide one is therefore also led to the
-nominal spread by itself: these lookers stay in the modes where they were met, and none is related to another.
+Members are drawn with enlarged spreads; failing members are carried back to the nominal spreads in stages (sequential
+importance sampling, Papaioannou, Papadimitriou & Straub 2016). Without levels, none can lead past a failure mode. The
+stages estimate the probability, but their members soon descend from a few wide members. Each wide member is therefore
+also led to the nominal spread alone: these lookers stay in their failure modes and are independent.
 """
 
 from __future__ import annotations
@@ -35,10 +35,10 @@ GROWTH, GROWN = 6, 100
 
 @dataclass(frozen=True, eq=False)
 class Witness:
-    """Members that fail, as the standard normals have them: u (m, d), about equally likely each; m = 0 where none was met.
+    """Failing members, distributed nearly as standard normals within the event: u (m, d); m = 0 if none was found.
 
-    lookers: (k, d), independent ones, as often in each mode as wide members meet it. probability: of the event, as the stages
-    say it. spread: of its relative error, roughly.
+    lookers: (k, d), independent members, in each mode as often as wide members find it. probability: the stages'
+    estimate. spread: its approximate relative error.
     """
 
     u: np.ndarray
@@ -48,7 +48,7 @@ class Witness:
 
 
 def pooled(looks: Sequence[Witness]) -> Witness:
-    """Independent looks as one; its spread is the larger of what they say and of how they differ."""
+    """Pool independent looks; the spread is the larger of their own estimates and their scatter."""
     told = np.array([each.probability for each in looks])
     mean = float(told.mean())
     own = math.sqrt(sum((each.probability * each.spread) ** 2 for each in looks if each.probability))
@@ -58,9 +58,9 @@ def pooled(looks: Sequence[Witness]) -> Witness:
 
 
 class Surroundings:
-    """Places that independent runs reached: apart if farther from their members than these are from another run.
+    """Regions that independent runs reached; a point is apart if it is farther away than the runs are from each other.
 
-    runs: failing members (m, d) of each.
+    runs: failing members (m, d) of each run.
     """
 
     def __init__(self, runs: Sequence[np.ndarray], rng: np.random.Generator):
@@ -73,12 +73,12 @@ class Surroundings:
         self._reach = float(np.median(odd)) if odd else math.inf
 
     def apart(self, u: np.ndarray) -> np.ndarray:
-        """Whether places (n, d) are apart: (n,)."""
+        """Mask (n,) of the points (n, d) that are apart."""
         return _least(u, self._u) > self._reach
 
 
 def _least(u: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """The distance of each place (n, d) to the nearest of others (m, d): (n,)."""
+    """Distance (n,) of each point (n, d) to the nearest of others (m, d)."""
     from scipy.spatial.distance import cdist
 
     parts = [cdist(u[i : i + 1000], others).min(axis=1) for i in range(0, len(u), 1000)]
@@ -86,16 +86,16 @@ def _least(u: np.ndarray, others: np.ndarray) -> np.ndarray:
 
 
 def wide_of(probability: float) -> float:
-    """The enlarged spread at which some percent of the members fail, for a half-space of this probability."""
+    """The enlarged spread at which a few percent of the members fail, for a half-space of this probability."""
     from scipy.special import ndtri
 
     return float(np.clip(-ndtri(max(probability, 1e-300)) / WIDE_OF, LEAST_WIDE, MOST_WIDE))
 
 
 def witnessed(happens: Happens, d: int, wide: float, rng: np.random.Generator, lookers: int = 1) -> Witness:
-    """Failing members from draws that are `wide` times as wide in each direction. docs/theory/rare_events.md, (B14).
+    """Find failing members among draws with `wide` times the spread in each direction. docs/theory/rare_events.md, (B14).
 
-    lookers: the fewest that are wanted.
+    lookers: minimum number of lookers.
     """
     drawn, u = 0, np.zeros((0, d))
     while drawn < FIRST or (0 < len(u) < lookers and drawn < MOST_FIRST):
@@ -125,7 +125,7 @@ def witnessed(happens: Happens, d: int, wide: float, rng: np.random.Generator, l
 
 
 def _next(now: float, squares: np.ndarray) -> float:
-    """The smallest spread, 1 at least, for which the weights of particles are worth enough of them, by bisection."""
+    """The smallest spread, at least 1, with a sufficient effective sample size of the particles, by bisection."""
 
     def worth(then: float) -> float:
         logs = -0.5 * squares * (then**-2 - now**-2)
@@ -144,7 +144,7 @@ def _next(now: float, squares: np.ndarray) -> float:
 def moved(
     happens: Happens, u: np.ndarray, spread: float, scale: float, rng: np.random.Generator
 ) -> tuple[np.ndarray, float]:
-    """One step (B4) of failing members within the event, by the law of this spread; and the next scale."""
+    """One step (B4) of failing members within the event, for the distribution with this spread; and the next scale."""
     places = math.sqrt(1.0 - scale**2) * u + scale * spread * rng.standard_normal(u.shape)
     accepted = happens(places)
     factor = math.exp(float(accepted.mean()) - ACCEPTANCE)
@@ -152,7 +152,7 @@ def moved(
 
 
 def led(happens: Happens, u: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Wide members (n, d) led to the nominal spread within the event: some numbers drawn anew in turn with steps (B4)."""
+    """Lead wide members (n, d) to the nominal spread within the event: redraw some numbers, alternating with steps (B4)."""
     scale = SCALE
     for _ in range(LED):
         places = np.where(rng.random(u.shape) < ANEW, rng.standard_normal(u.shape), u)
@@ -162,7 +162,7 @@ def led(happens: Happens, u: np.ndarray, rng: np.random.Generator) -> np.ndarray
 
 
 def grown(happens: Happens, u: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Failing members about those that there are (m, d): short chains, that a mixture can be fitted to."""
+    """Add failing members about the given ones (m, d) by short chains, so that a mixture can be fitted."""
     places, scale, kept = u[rng.permutation(GROWN) % len(u)], SCALE, []
     for _ in range(GROWTH):
         places, scale = moved(happens, places, 1.0, scale, rng)

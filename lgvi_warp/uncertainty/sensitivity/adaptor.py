@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A scene as a function of what varies, in the shapes of SALib and scipy."""
+"""A scene as a function of its varied numbers, in the array shapes of SALib and scipy."""
 
 from __future__ import annotations
 
@@ -22,19 +22,19 @@ from lgvi_warp.uncertainty.sensitivity.outputs import known_arguments
 
 
 class ScalarModel:
-    """A scene as a function of what varies, for SALib, scipy and other libraries; made by `model`.
+    """A scene as a function of its varied numbers, for SALib, scipy and other libraries; made by `model`.
 
     Args:
         scene: the scene.
-        vary: name -> distribution, or names alone.
+        vary: name -> distribution, or only names.
         of: one or several quantities of interest, as in `sobol`.
-        levels: whether X holds numbers in (0, 1) in place of the values themselves.
-        failed: "refuse" or "nan", for members that fail.
+        levels: True if X contains levels in (0, 1) instead of values.
+        failed: "refuse" raises an error if members fail; "nan" returns NaN for them.
         settings: further arguments of `lw.prepare`.
 
     Attributes:
-        names: of the columns of X (d,), in the order of `vary`.
-        scene, vary, of, levels, failed: as given.
+        names: names of the columns of X (d,), in the order of `vary`.
+        scene, vary, of, levels, failed: the arguments.
         problem: description of the columns for SALib.
 
     Methods:
@@ -67,10 +67,10 @@ class ScalarModel:
     def problem(self) -> dict[str, Any]:
         """Description of the columns for SALib.sample: num_vars, names, bounds, and dists or groups.
 
-        With levels it is the unit cube; otherwise it holds the distributions, all of which SALib must have.
+        With levels it describes the unit cube; otherwise the distributions, all of which SALib must have.
 
         Raises:
-            SceneError: for distributions that SALib does not have, and for names alone.
+            SceneError: if SALib does not have a distribution, or if `vary` has only names.
         """
         if self.levels:
             cube = salib_problem(self._fleet.space)
@@ -94,39 +94,39 @@ class ScalarModel:
 
     @property
     def distributions(self) -> list[Any]:
-        """Distribution of each column (d,), each with `ppf`, for scipy.stats.sobol_indices(dists=...).
+        """Distributions of the columns (d,), each with `ppf`, for scipy.stats.sobol_indices(dists=...).
 
         Raises:
-            SceneError: for names alone.
+            SceneError: if `vary` has only names.
         """
         if not self._variations:
             raise SceneError(["vary: names alone have no distributions. Map names to distributions"])
         return [_Levels() if self.levels else _Column(self._fleet, column) for column in self._columns]
 
     def __call__(self, X: Any, *, seed: int | None = None, indices: Any = None) -> np.ndarray:
-        """Run members with these numbers and return their quantities; row i always has the same noise, if not told otherwise.
+        """Run members with these numbers and return their quantities; by default, row i always has the same noise.
 
-        X: (n, d), columns in the order of `names`; or by name, in any order: a data frame, a mapping of columns, a structured
-            array, an xarray Dataset. By name a whole vector may be given, "current.velocity": (n, 3).
-        indices: (n,), whose noise each row has, as of such a run. Default None for 0 to n - 1.
-        Returns: Y (n,), or (n, m) of several numbers: SALib's shape.
+        X: (n, d), with columns in the order of `names`; or columns by name, in any order: a data frame, a mapping, a
+            structured array, an xarray Dataset. By name a whole vector may be given, "current.velocity": (n, 3).
+        indices: (n,), index of the member whose noise each row gets. Default None for 0 to n - 1.
+        Returns: Y (n,), or (n, m) for several numbers: SALib's shape.
         """
         return np.asarray(self._prepared(X, seed=seed, indices=indices, progress=self._progress))
 
     def scipy(self, X: Any, *, seed: int | None = None, indices: Any = None) -> np.ndarray:
-        """Run members as a call does, in scipy's shape.
+        """Run members like a call, with arrays in scipy's shape.
 
         Args:
-            X: (d, n), rows in the order of `names`; or by name, in any order.
-            seed: as of a call.
-            indices: as of a call.
+            X: (d, n), with rows in the order of `names`; or by name, in any order.
+            seed: as in a call.
+            indices: as in a call.
 
         Returns:
-            Y (n,), or (m, n) of several numbers.
+            Y (n,), or (m, n) for several numbers.
 
         Raises:
-            SceneError: for labels that are missing, unknown or doubled, and for what is no real number.
-            FailedMembers: with failed="refuse", where members failed.
+            SceneError: if labels are missing, unknown or duplicate, or if an entry is not a real number.
+            FailedMembers: with failed="refuse", if members failed.
         """
         if is_labelled(X):
             return np.ascontiguousarray(self(X, seed=seed, indices=indices).T)
@@ -146,7 +146,7 @@ class _Levels:
 
 @dataclass(frozen=True)
 class _Column:
-    """Distribution of the number that one column of an ensemble's cube determines."""
+    """Distribution of the number that one column of an ensemble's unit cube determines."""
 
     fleet: Ensemble
     column: int
@@ -169,7 +169,7 @@ class _Column:
 
 
 def entries_of(estimate: Any) -> list[tuple[Any, np.ndarray, dict[str, np.ndarray]]]:
-    """The distributions of the single entries of a variation, with the base and the numbers of each."""
+    """The distributions of a variation's entries, with the base and the numbers of each entry."""
     (base,) = estimate.bases
     distribution = estimate.distribution
     numbers = {name: np.broadcast_to(value, base.shape).reshape(-1)
@@ -180,7 +180,7 @@ def entries_of(estimate: Any) -> list[tuple[Any, np.ndarray, dict[str, np.ndarra
 
 
 def salib_distribution(distribution: Any, base: Any, numbers: Mapping[str, Any]) -> tuple[str, list[float]] | None:
-    """Translate a distribution to SALib's (name, bounds); None where SALib has none for it."""
+    """Translate a distribution to SALib's (name, bounds); None if SALib does not have it."""
     base = float(base)
     mean = float(numbers.get("mean", base))
     if distribution.kind == "normal":
@@ -205,24 +205,24 @@ def model(
     failed: str = "refuse",
     **settings: Any,
 ) -> ScalarModel:
-    """Turn a scene into a function of what varies; noise is frozen by row, unless a call gives `seed` or `indices`.
+    """Turn a scene into a function of its varied numbers; each row has fixed noise, unless a call gives `seed` or `indices`.
 
     f(X) takes X (n, d) and returns Y (n,) or (n, m), for SALib; f.scipy(X) takes X (d, n), for scipy's sobol_indices.
 
     Args:
         scene: the scene.
-        vary: name -> distribution, or names alone. The columns are the entries that `names` lists, in this order.
+        vary: name -> distribution, or only names. The columns are the entries in `names`, in this order.
         of: one or several quantities of interest, as in `sobol`.
-        levels: whether X holds numbers in (0, 1), which the distributions turn into values, in place of the values
-            themselves; joint distributions need it. Default False.
-        failed: "refuse" for an error where members fail, "nan" for NaN in their place. Default "refuse".
+        levels: True if X contains levels in (0, 1), which the distributions turn into values; joint distributions need
+            this. Default False: X contains values.
+        failed: "refuse" raises an error if members fail, "nan" returns NaN for them. Default "refuse".
         settings: further arguments of `lw.prepare` (method, h, t1, save, dtype, threads, common_noise), and `progress`.
 
     Returns:
         The function; X may also be a data frame, a mapping, a structured array or an xarray Dataset with columns by name.
 
     Raises:
-        SceneError: for faulty arguments, all in one message.
+        SceneError: if arguments are faulty; one message lists all.
         TypeError: for an argument that does not exist.
 
     Examples:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Sobol indices and Morris' screening of an ensemble; the latter by SALib's design and estimates."""
+"""Sobol indices and Morris screening of an ensemble; Morris screening uses SALib's design and estimates."""
 
 from __future__ import annotations
 
@@ -46,32 +46,32 @@ def sobol(
     failed: str = "refuse",
     **settings: Any,
 ) -> SobolIndices:
-    """Estimate Sobol indices of quantities of interest, by Saltelli's design and estimates.
+    """Estimate Sobol indices of quantities of interest, by Saltelli's design and estimators.
 
-    The factors vary independently; a joint distribution counts as one factor. The design is of independently scrambled Sobol
+    The factors vary independently; a joint distribution counts as one factor. It uses independently scrambled Sobol
     sequences, whose spread gives the intervals. Source: Saltelli et al. (2010), Computer Physics Communications 181.
 
     Args:
-        scene: a Scene, with what varies in its ensemble or in `vary`; or an Ensemble, for its scene, vary and seed.
+        scene: a Scene, with distributions in its [ensemble] or in `vary`; or an Ensemble, for its scene, vary and seed.
         of: "position[2]" or "depth" (at the end), "max(energy)" (over the path), "outcome floor", a lw.statistics.Quantity, a
             function of a Result to (n,) or (n, m), or several of these.
         samples: N, a multiple of `replicates`, best a power of two; N (2 d + 2) members are run for d factors, N (d + 2)
             without second_order. Default 1024.
-        vary: name -> distribution. Default: that of the scene or the ensemble.
-        seed: of the design. Default: that of the scene or the ensemble.
-        second_order: whether to estimate indices of pairs as well. Default True.
-        replicates: R, the number of sequences, a power of two to 64; with 1 there are no intervals. More make intervals more
-            reliable and estimates a little less exact. Default 8.
-        groups: name -> names of what is one factor together: {"start": ["start.position", "start.velocity"]}. Default none.
-        confidence: level of the intervals, between 0 and 1: Student's t of the replicates. Default 0.95.
-        failed: "refuse" for an error where members fail, "drop" to use the groups without a failed member. Default "refuse".
+        vary: name -> distribution. Default: the scene's or the ensemble's distributions.
+        seed: seed of the design. Default: the scene's or the ensemble's seed.
+        second_order: True also estimates second-order indices of pairs. Default True.
+        replicates: number R of sequences, a power of two up to 64; with 1 there are no intervals. More sequences make
+            intervals more reliable and estimates slightly less accurate. Default 8.
+        groups: name -> names that form one factor together: {"start": ["start.position", "start.velocity"]}. Default none.
+        confidence: level of the intervals, between 0 and 1, by Student's t over the replicates. Default 0.95.
+        failed: "refuse" raises an error if members fail, "drop" uses the groups without a failed member. Default "refuse".
         settings: arguments of `lw.solve` (method, h, t1, save, dtype, threads, progress) and of `evaluate`.
 
     Returns:
         First-order and total indices of every factor, in the order of `vary`, and second-order indices of pairs.
 
     Raises:
-        SceneError: for faulty arguments, all in one message.
+        SceneError: if arguments are faulty; one message lists all.
         TypeError: for an argument that does not exist.
         FailedMembers: if members failed and the indices cannot be computed from the others.
 
@@ -104,7 +104,7 @@ def sobol_of(fleet: Ensemble, outputs: Outputs, *, confidence: float = 0.95, fai
 
     Args:
         fleet: the ensemble that was run, with Saltelli's design.
-        outputs: its quantities of interest.
+        outputs: quantities of interest of its members.
         confidence: level of the intervals, between 0 and 1. Default 0.95.
         failed: "refuse" or "drop", as in `sobol`. Default "refuse".
 
@@ -141,7 +141,7 @@ def sobol_of(fleet: Ensemble, outputs: Outputs, *, confidence: float = 0.95, fai
 
 
 def _design_of(fleet: Ensemble, outputs: Outputs, kind: type[Design]) -> Design:
-    """The design of an ensemble that was run, of one kind. Raises SceneError for another one."""
+    """The design of an ensemble that was run. Raises SceneError if it is of another kind."""
     of_kind("outputs", outputs, "values labels failed counts", "of lw.uq.evaluate", "give what it returns")
     design = ensemble_of(fleet).sampling
     if not isinstance(design, kind):
@@ -151,7 +151,7 @@ def _design_of(fleet: Ensemble, outputs: Outputs, kind: type[Design]) -> Design:
 
 
 def _order(fleet: Ensemble, factors: Factors) -> list[int]:
-    """Places of the factors in the order of `vary`."""
+    """Indices of the factors in the order of `vary`."""
     columns = [column for variation in as_given(fleet) for column in columns_of(fleet.space, variation.key)]
     return sorted(range(len(factors)), key=lambda i: min(map(columns.index, factors[i][1])))
 
@@ -170,25 +170,25 @@ def morris(
     failed: str = "refuse",
     **settings: Any,
 ) -> MorrisEffects:
-    """Screen for the factors that matter, by Morris' elementary effects on few members.
+    """Screen for the factors that matter, by Morris' elementary effects, with few members.
 
     Args:
-        scene: a Scene, with what varies in its ensemble or in `vary`; or an Ensemble, for its scene, vary and seed.
+        scene: a Scene, with distributions in its [ensemble] or in `vary`; or an Ensemble, for its scene, vary and seed.
         of: one or several quantities of interest, as in `sobol`.
         samples: number of paths; samples (d + 1) members are run for d factors. Default 64.
-        levels: number of levels of the grid that paths go along, even; a step moves a factor by half the grid. Default 4.
-        vary: name -> distribution. Default: that of the scene or the ensemble.
-        seed: of the design. Default: that of the scene or the ensemble.
+        levels: number of levels of the paths' grid, even; a step moves a factor by half the grid. Default 4.
+        vary: name -> distribution. Default: the scene's or the ensemble's distributions.
+        seed: seed of the design. Default: the scene's or the ensemble's seed.
         confidence: level of the bootstrap's intervals, between 0 and 1. Default 0.95.
         resamples: number of the bootstrap's resamples. Default 100.
-        failed: "refuse" for an error where members fail, "drop" to use the paths without a failed member. Default "refuse".
+        failed: "refuse" raises an error if members fail, "drop" uses the paths without a failed member. Default "refuse".
         settings: arguments of `lw.solve` (method, h, t1, save, dtype, threads, progress) and of `evaluate`.
 
     Returns:
         Elementary effects of every factor.
 
     Raises:
-        SceneError: for faulty arguments, all in one message.
+        SceneError: if arguments are faulty; one message lists all.
         FailedMembers: if members failed and the effects cannot be computed from the others.
 
     Examples:
@@ -213,7 +213,7 @@ def morris_of(
 
     Args:
         fleet: the ensemble that was run, with Morris' design.
-        outputs: its quantities of interest.
+        outputs: quantities of interest of its members.
         confidence: level of the bootstrap's intervals, between 0 and 1. Default 0.95.
         resamples: number of the bootstrap's resamples. Default 100.
         failed: "refuse" or "drop", as in `morris`. Default "refuse".
@@ -258,7 +258,7 @@ def morris_of(
 def _common(
     factors: tuple[str, ...], outputs: Outputs, Y: np.ndarray, group: int, confidence: float, messages: list[str]
 ) -> dict[str, Any]:
-    """The fields that every analysis has."""
+    """Fields that all analyses share."""
     return {
         "factors": factors,
         "quantities": outputs.labels,
@@ -274,7 +274,7 @@ def _common(
 
 
 def check_settings(samples: Any, confidence: Any, failed: Any, resamples: Any = 2) -> None:
-    """Refuse settings of an analysis that are at fault; by default no resamples are drawn."""
+    """Refuse faulty settings of an analysis."""
     faults = Faults()
     for name, value in (("samples", samples), ("resamples", resamples)):
         if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 2:
@@ -287,7 +287,7 @@ def check_settings(samples: Any, confidence: Any, failed: Any, resamples: Any = 
 
 
 def designed(scene: Any, vary: Any, seed: int | None, design: Sampling, samples: int) -> Ensemble:
-    """The ensemble of a design with this number of groups; None for what the scene varies, and its seed."""
+    """The ensemble of a design with this number of groups; None takes the scene's distributions and seed."""
     settings: Any = (
         scene if isinstance(scene, Ensemble) else scene_of(scene, "scene").ensemble_settings or EnsembleSettings()
     )
@@ -307,7 +307,7 @@ def salib() -> Callable[..., Any]:
 
 
 def whole_groups(outputs: Outputs, group: int, failed: str) -> tuple[np.ndarray, list[str]]:
-    """Mask of groups without failure (N,), and messages about the others; FailedMembers where too few have none."""
+    """Mask of groups without failure (N,), and messages about the others; FailedMembers if too few are left."""
     if outputs.failed.any() and failed == "refuse":
         remedy = 'fix the failing members (see result.status of lw.solve), or use the whole groups alone: failed="drop"'
         raise FailedMembers([outputs.text(remedy)])
@@ -327,7 +327,7 @@ def whole_groups(outputs: Outputs, group: int, failed: str) -> tuple[np.ndarray,
 
 
 def varying(Y: np.ndarray, labels: Sequence[str], messages: list[str]) -> list[int]:
-    """The quantities that vary; write messages about those that do not."""
+    """Mask of the quantities that vary; adds messages about those that do not."""
     constant = np.ptp(Y, axis=0) <= CONSTANT * np.abs(Y).max(axis=0)
     messages += [f"{labels[int(q)]} does not vary: it has no indices" for q in np.flatnonzero(constant)]
     return [int(q) for q in np.flatnonzero(~constant)]

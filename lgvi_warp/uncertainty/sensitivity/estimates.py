@@ -18,7 +18,7 @@ class Ratio(NamedTuple):
 
 
 class SobolEstimates(NamedTuple):
-    """First and total indices (d,), and those of pairs (d, d), symmetric, NaN on the diagonal; None without pairs."""
+    """First-order and total indices (d,); second-order indices (d, d), symmetric, NaN on the diagonal, or None."""
 
     first: Ratio
     total: Ratio
@@ -28,10 +28,10 @@ class SobolEstimates(NamedTuple):
 def sobol_estimates(Y: np.ndarray, replicate: np.ndarray, second_order: bool, confidence: float) -> SobolEstimates:
     """Estimate the indices of one quantity (Saltelli et al. 2010, Computer Physics Communications 181).
 
-    Intervals are Student's t of the replicates' linearised ratios: points of one sequence are not independent, scrambles are.
+    Intervals follow from Student's t over the replicates' linearised ratios: scrambles are independent, points are not.
 
-    Y: (N, group size), in the order of the design: A, A with each factor of B, B with each of A, and B.
-    replicate: (N,), from which scramble each group is.
+    Y: (N, group size), in the order of the design: A, A with each factor of B, B with each factor of A, and B.
+    replicate: (N,), index of each group's scramble.
     """
     y = Y - Y.mean()
     d = (y.shape[1] - 2) // (2 if second_order else 1)
@@ -58,7 +58,7 @@ def sobol_estimates(Y: np.ndarray, replicate: np.ndarray, second_order: bool, co
 def _ratio(parts: np.ndarray, totals: np.ndarray, replicate: np.ndarray, confidence: float) -> Ratio:
     """The ratio of the means of `parts` (N, d) and `totals` (N,), with the interval of its linearisation.
 
-    Of R replicates with sums n_r and w_r the error of T = n / w is that of the sum of u_r = n_r - T w_r, over w.
+    For R replicates with sums n_r and w_r, the error of T = n / w is that of the sum of u_r = n_r - T w_r, divided by w.
     """
     value = parts.mean(axis=0) / totals.mean()
     _, place = np.unique(replicate, return_inverse=True)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""First-order indices of any run by all that varied in it, from its members as they are."""
+"""First-order indices of any run for all numbers that varied in it, from its members as they are."""
 
 from __future__ import annotations
 
@@ -28,15 +28,15 @@ MOST_COMPARED = 200
 
 @dataclass(frozen=True, eq=False)
 class GivenDataIndices(Indices):
-    """First-order indices from given data: the part of each quantity's variance that one input explains alone.
+    """First-order indices from given data: the fraction of each quantity's variance that one input explains alone.
 
     Attributes:
-        first: the part (m, d) [1]; may come out just below 0.
-        first_confidence: the larger distance from it to an end of its interval (m, d).
-        lower: lower end of its interval (m, d).
-        upper: upper end of its interval (m, d).
-        p: p-value: probability of an index of at least this size by chance (m, d).
-        slope: coefficient of the linear regression of standardised numbers (m, d); its sign says the direction.
+        first: the fraction (m, d) [1]; the estimate may be slightly below 0.
+        first_confidence: distance from `first` to the farther end of its interval (m, d).
+        lower: lower end of the interval (m, d).
+        upper: upper end of the interval (m, d).
+        p: p-value, the probability that chance alone gives an index of at least this size (m, d).
+        slope: coefficient of the linear regression of standardised numbers (m, d); its sign is the direction of the effect.
     """
 
     first: np.ndarray
@@ -56,10 +56,10 @@ def given_data(
 ) -> GivenDataIndices:
     """Estimate first-order indices of a finished run for every number that varied in it, including those of the start.
 
-    No design is needed. The members are divided into bins of each input. The index is the part of the variance that lies
-    between the bins' means, less the part that chance alone would put there. The interval is that of the noncentral F
-    distribution, wider where the numbers are not normal. Interactions are not seen (see `lw.uq.sobol`). Inputs are meant to
-    be independent: what correlated inputs explain together counts for each of them.
+    No design is needed. The members are divided into bins of each input. The index is the fraction of the variance
+    between the bins' means, minus the fraction expected by chance. The interval follows from the noncentral F
+    distribution, and is wider if the numbers are not normal. Interactions are not detected (see `lw.uq.sobol`). Inputs
+    should be independent: the common effect of correlated inputs counts for each of them.
 
     Args:
         result: A result of `lw.solve`, `lw.open_run` or `lw.Result.load`, or the path of a store.
@@ -71,7 +71,7 @@ def given_data(
         The indices: factors are the numbers that varied, such as "vehicle.mass" and "start.position[2]".
 
     Raises:
-        SceneError: If nothing varied, members have weights, or samples are needed that were not kept.
+        SceneError: If nothing varied, members have weights, or needed samples were not saved.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -117,7 +117,7 @@ def given_data(
 
 
 def _check(result: Result, inputs: Mapping[str, np.ndarray], confidence: float) -> None:
-    """Refuse what has no indices."""
+    """Refuse a result without indices, and a faulty confidence."""
     faults = Faults()
     level = faults.number("confidence", confidence, "1")
     if level is not None and not 0.0 < level < 1.0:
@@ -132,7 +132,7 @@ def _check(result: Result, inputs: Mapping[str, np.ndarray], confidence: float) 
 
 
 def _values(result: Result, of: Sequence[OfResult]) -> tuple[list[np.ndarray], tuple[str, ...]]:
-    """The numbers (n,) of each quantity and component, NaN where a member failed; and their labels."""
+    """The numbers (n,) of each quantity and component, NaN if a member failed; and their labels."""
     kept, names = KeptSamples(result), set[str]()
     for each in of:
         known = set(result.samples)
@@ -177,7 +177,7 @@ def _messages(
 
 
 def _correlated(inputs: Mapping[str, np.ndarray]) -> list[tuple[str, str, float]]:
-    """The most correlated inputs, five pairs at most."""
+    """Text of the most correlated inputs, at most five pairs."""
     names = list(inputs)[:MOST_COMPARED]
     if len(names) < 2:
         return []

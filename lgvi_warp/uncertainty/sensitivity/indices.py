@@ -22,7 +22,7 @@ class Indices(Saved):
     """Result of a sensitivity analysis of m quantities for d factors.
 
     Attributes:
-        factors: what varies independently (d,).
+        factors: names of the factors, which vary independently (d,).
         quantities: labels of the quantities of interest (m,).
         mean: mean of the quantities over the design (m,) [their units].
         std: standard deviation of the quantities over the design (m,) [their units].
@@ -79,7 +79,7 @@ class Indices(Saved):
         return f"{'; '.join(texts[:MOST_QUANTITIES])}{more}."
 
     def _ranking(self, q: int) -> str:
-        """The factors on which a quantity depends most: several where their intervals overlap."""
+        """Text of the factors on which a quantity depends most; several if their intervals overlap."""
         quantity, values = self.quantities[q], getattr(self, self.ranked)[q]
         half = np.nan_to_num(getattr(self, self.intervals[self.ranked])[q])
         known = [f for f in np.argsort(-values, kind="stable") if np.isfinite(values[f])]
@@ -98,7 +98,7 @@ class Indices(Saved):
         return f"{quantity} depends most on {texts[0]}{then}"
 
     def _amount(self, q: int, value: float, half: float) -> str:
-        """The amount that a factor explains of a quantity."""
+        """Text of the fraction of a quantity's variance that a factor explains."""
         # No factor explains more than all: the estimate may.
         return f"{percent(min(value, 1.0), 3)} +- {100.0 * half:.2g} % of its variance"
 
@@ -132,7 +132,7 @@ class Indices(Saved):
 
     @classmethod
     def _of_content(cls, content: dict[str, Any]) -> Indices:
-        """Indices of the analysis that the content names. Raises ValueError where that is not known."""
+        """Read the indices of the analysis that the content names. Raises ValueError if it is unknown."""
         kinds = [kind for kind in cls.__subclasses__() or [cls] if kind.name == content["name"]]
         if not kinds:
             raise ValueError(f"{content['name']!r} is not an analysis")
@@ -140,7 +140,7 @@ class Indices(Saved):
 
     @classmethod
     def _from(cls, content: dict[str, Any]) -> Indices:
-        """A result from the content of a JSON file."""
+        """Read a result from the content of a JSON file."""
         places = _places(content)
         shape = len(content["quantities"]), len(content["factors"])
         rows = [row for row in content["rows"] if row["index"] in cls.columns]
@@ -165,24 +165,23 @@ class Indices(Saved):
 
 
 def _places(content: dict[str, Any]) -> dict[str, dict[str, int]]:
-    """Places of the names of quantities and of factors."""
+    """Indices of quantities and of factors, by name."""
     return {key: {name: i for i, name in enumerate(content[key])} for key in ("quantities", "factors")}
 
 
 @dataclass(frozen=True, eq=False)
 class SobolIndices(Indices):
-    """Parts of the variance of each quantity.
+    """Sobol indices: fractions of the variance of each quantity.
 
-    All indices of a quantity that does not vary are NaN, and a message says so.
+    All indices of a quantity that does not vary are NaN, and a message reports it.
 
     Attributes:
-        first: part due to each factor alone (m, d) [1].
-        first_confidence: half width of its interval (m, d).
-        total: part due to each factor with all its interactions (m, d) [1].
-        total_confidence: half width of its interval (m, d).
-        second: part due to two factors together, beyond what each does alone (m, d, d) [1]; symmetric, NaN on the diagonal;
-            None if not asked for.
-        second_confidence: half width of its interval (m, d, d), or None.
+        first: fraction due to each factor alone (m, d) [1].
+        first_confidence: half width of the interval of `first` (m, d).
+        total: fraction due to each factor with all its interactions (m, d) [1].
+        total_confidence: half width of the interval of `total` (m, d).
+        second: fraction due to the interaction of two factors (m, d, d) [1]; symmetric, with NaN on the diagonal; or None.
+        second_confidence: half width of the interval of `second` (m, d, d), or None.
     """
 
     first: np.ndarray
@@ -206,7 +205,7 @@ class SobolIndices(Indices):
 
     @classmethod
     def _pairs_from(cls, content: dict[str, Any]) -> dict[str, Any]:
-        """Indices of two factors together, where the file has them."""
+        """Second-order indices, if the file has them."""
         rows = [row for row in content["rows"] if row["index"] == "second"]
         if not rows:
             return {"second": None, "second_confidence": None}
@@ -241,15 +240,15 @@ class SobolIndices(Indices):
 
 @dataclass(frozen=True, eq=False)
 class MorrisEffects(Indices):
-    """Elementary effects on each quantity, per whole side of the unit cube.
+    """Elementary effects on each quantity, scaled to the whole range of a factor (side of the unit cube).
 
-    mu and sigma of a factor of several numbers, such as an attitude, are NaN: a step moves all of them.
+    mu and sigma of a factor with several numbers, such as an attitude, are NaN: a step moves all of its numbers.
 
     Attributes:
-        mu_star: mean of their absolute values (m, d) [the quantity's unit].
-        mu_star_confidence: half width of its interval (m, d).
-        mu: mean (m, d) [the quantity's unit].
-        sigma: standard deviation (m, d) [the quantity's unit]; large where a factor acts differently from place to place.
+        mu_star: mean absolute effect (m, d) [the quantity's unit].
+        mu_star_confidence: half width of the interval of `mu_star` (m, d).
+        mu: mean effect (m, d) [the quantity's unit].
+        sigma: standard deviation of the effects (m, d) [the quantity's unit]; large for nonlinear effects or interactions.
     """
 
     mu_star: np.ndarray

@@ -30,7 +30,7 @@ R = TypeVar("R")
 
 
 def known_arguments(**gone: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """Refuse arguments that neither the function nor its runs have, by the function's own name."""
+    """Refuse arguments that neither the function nor its runs have; the message has the function's name."""
 
     def decorated(function: Callable[P, R]) -> Callable[P, R]:
         named = [p.name for p in inspect.signature(function).parameters.values() if p.kind is not p.VAR_KEYWORD]
@@ -60,24 +60,23 @@ def evaluate(
     save: SaveAt | None = None,
     **settings: Any,
 ) -> Outputs:
-    """Run an ensemble, some thousands of members at a time, and keep its quantities of interest only.
+    """Run an ensemble, some thousands of members at a time, and keep only its quantities of interest.
 
-    A member failed if its status is a failure or one of its quantities is not finite. A stop by an event is no failure.
+    A member counts as failed if its status is a failure or a quantity is not finite. A stop by an event is no failure.
 
     Args:
         fleet: the ensemble.
         of: one or several quantities of interest, as in `sobol`.
-        common_noise: whether forces with noise act on every member alike. Default False.
-        progress: True shows a bar or lines, as in lw.solve; a function is called with the fraction of the members that is
-            done, from 0 to 1.
-        save: samples to keep of each run. Default: those that the quantities need.
+        common_noise: True gives every member the same noise of forces. Default False.
+        progress: True shows a bar or lines, as in lw.solve; a function is called with the completed fraction, from 0 to 1.
+        save: samples to save in each run. Default: those that the quantities need.
         settings: arguments of `lw.solve` (method, h, t1, dtype, width, checks, on_failure, threads, executor, scheduler).
 
     Returns:
-        The quantities of every member, and which members failed.
+        The quantities of every member, and a mask of failed members.
 
     Raises:
-        SceneError: for faulty arguments, and where a path is needed and no sampling interval is known.
+        SceneError: if arguments are faulty, or if a path is needed but no sampling interval is known.
 
     Examples:
         >>> import lgvi_warp as lw

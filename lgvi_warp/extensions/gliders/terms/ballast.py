@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Volumes that a vehicle displaces beside its own: held, along a schedule, or as a controller commands."""
+"""Volumes that a vehicle displaces in addition to its hull: constant, by a schedule, or commanded by a controller."""
 
 from __future__ import annotations
 
@@ -30,29 +30,30 @@ from lgvi_warp.physics.terms.wrench import at_start, commands
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Ballast(Commanded):
-    """n volumes V that are displaced beside the vehicle's: force -rho g V R^T e3 at points of the body (Graver 2005, ch. 4).
+    """n volumes V displaced in addition to the hull: force -rho g V R^T e3 at points of the body (Graver 2005, ch. 4).
 
-    V is the command within its limit, after the lag and no faster than the rate limit: above 0 it lifts, below 0 it sinks. A
-    weight in water of N newtons is V = -N / (rho g). The vehicle's mass does not change, as when oil is pumped into a
-    bladder.
+    V follows the command after the lag, within the limit and the rate limit. A positive V lifts the vehicle, a negative V
+    sinks it. A weight of N newtons in water is V = -N / (rho g). The vehicle's mass does not change, as when oil is pumped
+    into a bladder.
 
-    With an efficiency, the pump's work is part of the energy used (`EnergyUse`): the water's pressure above that at the
-    surface, times the volume that is pumped out, over the efficiency. Volume that the pressure pushes back costs nothing
-    and returns nothing.
+    With an efficiency, the pump's work is part of the energy used (`EnergyUse`). The energy is the water's pressure relative
+    to the surface, times the volume that is pumped out, divided by the efficiency. If the pressure pushes volume back in,
+    no energy is used or recovered.
 
     Args:
-        position: Where each volume acts, (n, 3) [m] from the body's origin; one at the origin by default.
+        position: Point at which each volume acts, (n, 3) [m] from the body's origin; by default one volume at the origin.
         limit: Largest size of the command, (n,) [m3]; 1e6 by default.
-        time_constant: Time constant of the first-order lag from the command to V, (n,) [s]; 0 by default, no lag.
-        rate_limit: Largest rate of V, the pump's, (n,) [m3/s]; none by default.
-        efficiency: Work against the water's pressure over electrical energy of each pump, (n,), above 0 and at most 1; if
-            omitted, they do not count in the energy account, as for weights that drop.
-        command: Volume that is held, (n,) [m3]; 0 by default.
+        time_constant: Time constant of the first-order lag from the command to V, (n,) [s]; 0 by default, for no lag.
+        rate_limit: Largest rate of change of V, that of the pump, (n,) [m3/s]; by default no limit.
+        efficiency: Work against the water's pressure divided by the electrical energy of each pump, (n,), above 0 and at
+            most 1. If omitted, the volumes use no energy, as for weights that are dropped.
+        command: Constant volume, (n,) [m3]; 0 by default.
         times: Times of the schedule, (k,) [s], rising.
         command_schedule: Volumes at these times, (k, n) [m3], linear between them; instead of `command`.
 
     Raises:
-        SceneError: If times do not rise, or the command is given twice. Also if a number is invalid (see `Term`).
+        SceneError: If times do not rise, `command` differs from the first volumes of the schedule, or a number is invalid
+            (see `Term`).
 
     Examples:
         >>> import lgvi_warp as lw
@@ -102,7 +103,7 @@ class Ballast(Commanded):
 
     @property
     def steady(self) -> bool:
-        """Whether its volumes never change."""
+        """Whether the volumes never change."""
         return self.driver is None and self.holds
 
     @property
@@ -114,7 +115,7 @@ class Ballast(Commanded):
 
     @property
     def powered(self) -> bool:
-        """Whether its scene accounts the work of its pumps."""
+        """Whether the scene's energy account includes the work of these pumps."""
         return self.accounted and self.efficiency is not None and not self.steady
 
     @property
@@ -191,7 +192,7 @@ class Ballast(Commanded):
     def _with_work(
         self, numbers: Numbers, blocks: Array, context: PackingContext, table: Array | None, size: int
     ) -> Packed:
-        """The same with a memory of the volumes at the last look, and of pressures: -1 before the first."""
+        """Packed numbers with a memory of the volumes and pressures at the last step; pressures are -1 before the first."""
         plain, start = self.beside_account(False), np.zeros((1, self.channels))
         if self.driver is None:
             start = at_start(*commands(numbers), context.time)
@@ -212,7 +213,7 @@ class Ballast(Commanded):
         return -(net * position[..., 2] + np.sum(lever * attitude[..., 2, :], axis=-1))
 
     def _in_profile(self, numbers: Numbers, position: Array, attitude: Array, parameters: Numbers) -> Array:
-        """The same in water of a density by depth: volumes times the weight of the columns above them."""
+        """The potential in water whose density varies with depth: volumes times the weight of the water column above them."""
         profile, density = own(self.profile, parameters), parameters["environment.water_density"]
         volumes = np.clip(numbers["command"], -numbers["limit"], numbers["limit"])
         total = np.zeros(position.shape[:-1])
@@ -232,7 +233,7 @@ def specific_weight(parameters: Numbers) -> np.ndarray:
 
 
 def _held(numbers: Numbers, weight: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The force downward (n,) [N] of volumes that are held, and the sum of points (n, volumes, 3) times forces [N m]."""
+    """Downward force (n,) [N] of constant volumes, and the sum of points (n, volumes, 3) times forces (n, 3) [N m]."""
     volumes = np.clip(numbers["command"], -numbers["limit"], numbers["limit"])
     net, lever = np.zeros(1), np.zeros((1, 3))
     # One after the other: the same bits for one member and for many.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A buoyancy engine: a pump between two volumes that turns at two depths."""
+"""A buoyancy engine: a pump between two volumes that reverses at two depths."""
 
 from __future__ import annotations
 
@@ -24,31 +24,33 @@ NUMBERS = ("pump_rate", "volume_down", "volume_up", "depth_top", "depth_bottom",
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class BuoyancyEngine(Term):
-    """A volume V beside the vehicle's, which a pump takes to `volume_down` or `volume_up`: force -rho(d) g V R^T e3.
+    """A volume V in addition to the hull, which a pump changes to `volume_down` or `volume_up`: force -rho(d) g V R^T e3.
 
-    Going down, it turns to `volume_up` where the body's origin comes to `depth_bottom`; going up, to `volume_down` where it
-    comes to `depth_top` (Graver 2005, 4; Eriksen et al. 2001). The turn is found within the step, to second order.
+    In a dive, the pump starts to pump to `volume_up` when the body's origin reaches `depth_bottom`. In an ascent, it starts
+    to pump to `volume_down` when the origin reaches `depth_top` (Graver 2005, 4; Eriksen et al. 2001). The start of pumping
+    is located within the step, to second order.
 
-    With an efficiency, the pump's work is part of the energy used (`EnergyUse`): the water's pressure above that at the
-    surface, times the volume that is pumped out, over the efficiency. Volume that the pressure pushes back costs nothing
-    and returns nothing.
+    With an efficiency, the pump's work is part of the energy used (`EnergyUse`). The energy is the water's pressure relative
+    to the surface, times the volume that is pumped out, divided by the efficiency. If the pressure pushes volume back in,
+    no energy is used or recovered.
 
     Args:
         pump_rate: Rate q of the pump [m3/s].
-        volume_down: Volume of a dive [m3], most often below 0.
-        volume_up: Volume of an ascent [m3], above `volume_down`.
-        depth_top: Depth at which an ascent turns [m].
-        depth_bottom: Depth at which a dive turns [m], below `depth_top`.
-        position: Where the volume acts, (3,) [m] from the body's origin; the origin by default.
-        volume_start: Volume at the start [m3]; by default that of `first`.
+        volume_down: Volume during a dive [m3], most often below 0.
+        volume_up: Volume during an ascent [m3], above `volume_down`.
+        depth_top: Depth at which an ascent ends and a dive begins [m].
+        depth_bottom: Depth at which a dive ends and an ascent begins [m], deeper than `depth_top`.
+        position: Point at which the volume acts, (3,) [m] from the body's origin; the origin by default.
+        volume_start: Volume at the start [m3]; by default the volume for the direction `first`.
         gradient: Relative change of the water's density per depth [1/m], as in `Stratification`; 0 by default.
         reference_depth: Depth at which the density is that of the environment [m]; 0 by default.
-        efficiency: Work against the water's pressure over electrical energy of the pump, above 0 and at most 1; if omitted,
-            the pump does not count in the energy account.
+        efficiency: Work against the water's pressure divided by the electrical energy of the pump, above 0 and at most 1. If
+            omitted, the pump does not count in the energy account.
         first: Direction at the start: "down", the default, or "up".
 
     Raises:
-        SceneError: If a volume or a depth is not below the other. Also if a number is invalid (see `Term`).
+        SceneError: If `volume_down` is not below `volume_up`, `depth_top` is not above `depth_bottom`, or a number is invalid
+            (see `Term`).
 
     Examples:
         >>> import lgvi_warp as lw
@@ -101,7 +103,7 @@ class BuoyancyEngine(Term):
 
     @property
     def powered(self) -> bool:
-        """Whether its scene accounts the pump's work."""
+        """Whether the scene's energy account includes the pump's work."""
         return self.accounted and self.efficiency is not None
 
     def device_in(self, aligned: bool) -> str:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Density of the water by depth, a table that hull, ballast and buoyancy engine share."""
+"""Density of the water against depth, a table that the hull, ballast and buoyancy engine share."""
 
 from __future__ import annotations
 
@@ -31,25 +31,25 @@ DENSE = (1500.0, "brines of the deep sea have 1,300 kg/m3 at most")
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class DensityProfile(Term):
-    """Density of the water by depth, a table rho(d), linear between its depths and constant outside.
+    """Density of the water against depth: a table rho(d), linear between its depths and constant outside.
 
-    The hull's buoyancy is B rho(d) / rho0 (1 - compressibility (d - d0)), B the vehicle's buoyancy, rho0 the water's density
-    of the environment, d the depth of the centre of buoyancy. `ballast` and `buoyancy_engine` displace water of the same
-    density, and their pumps work against its weight. Drag and added mass keep rho0.
+    The hull's buoyancy is B rho(d) / rho0 (1 - compressibility (d - d0)). B is the vehicle's buoyancy, rho0 the water
+    density of the environment, and d the depth of the centre of buoyancy. `ballast` and `buoyancy_engine` displace water
+    of the density rho(d), and their pumps work against its weight. Drag and added mass use rho0.
 
     Args:
         depths: Depths, (k,) [m], rising.
-        densities: Densities there, (k,) [kg/m3], at the pressure of their depth.
+        densities: In-situ densities at these depths, (k,) [kg/m3], that is, at the pressure of the depth.
         compressibility: Relative loss of the hull's volume per depth [1/m]; none by default.
         reference_depth: The depth d0 at which the hull has its volume B / (rho0 g) [m]; 0 if omitted.
 
     Methods:
         from_cast: Profile of a CTD cast, from arrays of temperature and salinity or from a file.
-        density_at: Density at depths.
+        density_at: Density at given depths.
 
     Raises:
-        SceneError: If depths do not rise; or a number is invalid (see `Term`). A scene refuses a `stratification`, or an
-            engine with a `gradient`, beside it.
+        SceneError: If depths do not rise, or a number is invalid (see `Term`). A scene refuses a profile together with a
+            `stratification` or with an engine that has a `gradient`.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -80,18 +80,18 @@ class DensityProfile(Term):
         """Profile of a CTD cast.
 
         Args:
-            file: Path of a CSV file with a line of names, or of a NetCDF file; None where the columns are given. Names are
-                depth or pressure, and density, or temperature and salinity, in any case, with units after them.
-            **columns: Instead of a file `depth` [m] or `pressure` [dbar], and `density` [kg/m3], or `temperature` [deg C, in
-                situ] and `salinity` [practical], (k,) each; with both `latitude` and `longitude` [deg], 0 where they are
-                left out; and fields of the term, such as `compressibility`.
+            file: Path of a CSV file with a line of names, or of a NetCDF file; None if columns are given instead. The file
+                has depth or pressure, and density or temperature and salinity. Units may follow the names; case is ignored.
+            **columns: Columns (k,) instead of a file: `depth` [m] or `pressure` [dbar], and either `density` [kg/m3] or
+                `temperature` [deg C, in situ] with `salinity` [practical]. `latitude` and `longitude` [deg] are 0 by default.
+                Fields of the term, such as `compressibility`, may be given as well.
 
         Returns:
-            The profile, by TEOS-10 where it has temperatures (McDougall & Barker 2011).
+            The profile. Densities follow from temperatures by TEOS-10 (McDougall & Barker 2011).
 
         Raises:
-            SceneError: If a column is missing or wrong; with the remedy.
-            MissingExtra: If gsw is not installed, which makes densities of temperatures and salinities.
+            SceneError: If a column is missing or invalid; the message names the remedy.
+            MissingExtra: If gsw is not installed, which computes densities from temperatures and salinities.
 
         Examples:
             >>> import lgvi_warp as lw
@@ -105,10 +105,10 @@ class DensityProfile(Term):
         return cls(depths=depths, densities=densities, **others)
 
     def density_at(self, depth: Any) -> Array:
-        """Density at depths, with the scene's numbers.
+        """Density at given depths, from the profile's own numbers.
 
         Args:
-            depth: Depths, of any shape [m].
+            depth: Depths of any shape [m].
 
         Returns:
             Densities of the same shape [kg/m3].
@@ -151,14 +151,14 @@ class DensityProfile(Term):
         return Packed(values | {"density_knots": count}, rows)
 
     def rows(self, numbers: Numbers, reference: Array) -> tuple[Array, int]:
-        """Rows of the table of rho / rho0, as device/density.py reads it.
+        """Rows of the table of rho / rho0, in the form that device/density.py reads.
 
         Args:
             numbers: The term's numbers by field, each of shape (n, ...).
             reference: rho0, (n,) [kg/m3].
 
         Returns:
-            (n, rows), and the count of knots after the first.
+            The rows (n, rows), and the number of knots after the first.
         """
         depths, share, _ = repeated(numbers["depths"], numbers["densities"], reference)
         share = share / reference[:, None]
@@ -170,7 +170,7 @@ class DensityProfile(Term):
         return side_by_side(table, -np.sum(np.diff(share) * swept, axis=1, keepdims=True)), count
 
     def column(self, numbers: Numbers, reference: Array, depth: Array) -> Array:
-        """Integral of rho / rho0 from the surface to depths.
+        """Integral of rho / rho0 from the surface to given depths.
 
         Args:
             numbers: The term's numbers by field, each of shape (n, ...).
@@ -178,7 +178,7 @@ class DensityProfile(Term):
             depth: Depths (k, n) [m].
 
         Returns:
-            (k, n) [m].
+            Integrals (k, n) [m].
         """
         share = numbers["densities"] / reference[:, None]
         total = share[:, 0] * depth
@@ -202,7 +202,7 @@ class DensityProfile(Term):
 
 
 def in_profile(term: Any, terms: Sequence[Term]) -> Any:
-    """A term that knows the density of the water by depth, where its scene has a profile."""
+    """The term, with the scene's density profile if there is one."""
     profile = next((other for other in terms if isinstance(other, DensityProfile)), None)
     if profile is term.profile:
         return term
@@ -212,6 +212,6 @@ def in_profile(term: Any, terms: Sequence[Term]) -> Any:
 
 
 def profile_rows(term: Any, parameters: Numbers) -> tuple[Array, int]:
-    """Rows of the profile that a term knows, and the count of its knots after the first."""
+    """Rows of the density profile of a term, and the number of its knots after the first."""
     rows: tuple[Array, int] = term.profile.rows(own(term.profile, parameters), parameters["environment.water_density"])
     return rows

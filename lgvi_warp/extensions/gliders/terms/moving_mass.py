@@ -36,35 +36,35 @@ LIGHT = 0.1
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class MovingMass(Term):
-    """A mass in the vehicle that moves along a path, on a command, or both: a battery that slides and rolls, a trim weight.
+    """A mass in the vehicle that moves along a path, by commands, or both: a sliding and rolling battery, a trim weight.
 
-    The vehicle's mass, inertia and center of gravity include it at its reference place. Its weight then acts where it is:
-    the torque (r - r0) x m g R^T e3. A path is linear between its times, and holds its ends. If its inertia counts,
-    Runge-Kutta methods use the vehicle's inertia with the mass at its present place, and the vehicle recoils as the mass
-    moves.
+    The vehicle's mass, inertia and center of gravity must include this mass at its reference position r0. At the position r
+    its weight adds the torque (r - r0) x m g R^T e3. A path is linear between its times, and holds its ends. If `inertia`
+    is True, Runge-Kutta methods use the vehicle's inertia with the mass at its present position, and the vehicle recoils as
+    the mass moves.
 
-    A controller commands up to two channels: the distance by which the mass slides from the path [m], and the angle by
-    which mass and slide direction turn about an axis [rad]. n' = (command - n) / time constant, |n'| at most the rate
-    limit, the command within the limit; both are 0 at the start, and without a controller.
+    A controller commands up to two channels n: the distance by which the mass slides from the path [m], and the angle by
+    which the mass and its slide direction turn about an axis [rad]. n' = (command - n) / time constant, with |n'| at most
+    the rate limit and the command within the limit. Both channels are 0 at the start and without a controller.
 
     Args:
         mass: Mass m [kg].
-        places: Places of the path, (k, 3) [m] from the body's origin; one place for a mass that a controller alone moves.
-        times: Times of these places, (k,) [s], rising; by default 0 for one place.
-        reference: Place r0 at which the vehicle's numbers include it, (3,) [m]; by default the first of `places`.
-        slide_direction: Direction in which a controller slides it, (3,), of any length but 0; none by default.
-        turn_axis: Axis about which a controller turns it, (3,), of any length but 0; none by default.
+        places: Positions of the path, (k, 3) [m] from the body's origin; one position if only a controller moves the mass.
+        times: Times of these positions, (k,) [s], rising; by default 0 for one position.
+        reference: Position r0 at which the vehicle's numbers include the mass, (3,) [m]; by default the first of `places`.
+        slide_direction: Direction in which a controller slides the mass, (3,), of any length but 0; none by default.
+        turn_axis: Axis about which a controller turns the mass, (3,), of any length but 0; none by default.
         turn_center: A point of this axis, (3,) [m] from the body's origin; the origin by default.
-        limit: Largest command either way, for each channel, (c,) [m, rad]; none by default.
-        rate_limit: Largest rate of each channel, (c,) [m/s, rad/s]; none by default.
-        time_constant: Time constant of the lag of each channel, (c,) [s]; 0 by default, no lag.
-        inertia: Whether its inertia moves with it, beside its weight: True, False, or "auto", the default, True above a tenth
-            of the vehicle's mass.
+        limit: Largest size of the command of each channel, (c,) [m, rad]; by default no limit.
+        rate_limit: Largest rate of each channel, (c,) [m/s, rad/s]; by default no limit.
+        time_constant: Time constant of the lag of each channel, (c,) [s]; 0 by default, for no lag.
+        inertia: Whether the vehicle's inertia changes as the mass moves: True, False, or "auto", the default, which is True
+            if the mass exceeds a tenth of the vehicle's mass.
 
     Raises:
-        SceneError: If times do not rise or are missing, a direction has no length, numbers of channels are given without
-            channels, in a scene whose vehicle cannot include it at its reference place; or a number is invalid (see
-            `Term`).
+        SceneError: If times do not rise or are missing, a direction has length 0, numbers of channels are given without
+            channels, or a number is invalid (see `Term`). A scene refuses the mass if its vehicle cannot include it at the
+            reference position.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -241,13 +241,13 @@ class MovingMass(Term):
 
 
 def square_at(r: np.ndarray) -> np.ndarray:
-    """J^T J (n, 6, 6) of the velocity J (nu; Om) = nu + Om x r of places r (n, 3) [m]: the inertia of 1 kg there."""
+    """J^T J (n, 6, 6), the inertia of 1 kg at positions r (n, 3) [m], which have the velocity J (nu; Om) = nu + Om x r."""
     J = np.concatenate([np.broadcast_to(EYE, (len(r), 3, 3)), -hat(r)], axis=-1)
     return np.swapaxes(J, -1, -2) @ J
 
 
 def along(times: Array, places: Array, t: Array) -> tuple[Array, Array]:
-    """Places (k, n, 3) [m] at times t (k,) on paths (n, points, 3), and velocities [m/s], those before at a path's times."""
+    """Positions (k, n, 3) [m] at times t (k,) on paths (n, points, 3), and velocities [m/s], at knots those before."""
     times, places = repeated(times, places)
     span, change, since = np.diff(times), np.diff(places, axis=1), t[:, None, None] - times
     parts = np.clip(since[..., :-1] / span, 0.0, 1.0)
@@ -257,6 +257,6 @@ def along(times: Array, places: Array, t: Array) -> tuple[Array, Array]:
 
 
 def unit(v: np.ndarray) -> np.ndarray:
-    """Vectors (..., 3) of length 1; those without length stay."""
+    """Vectors (..., 3) scaled to length 1; zero vectors stay zero."""
     length = np.linalg.norm(v, axis=-1, keepdims=True)
     return np.asarray(v / np.where(length > 0.0, length, 1.0))

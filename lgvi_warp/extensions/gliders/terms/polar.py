@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Forces and moments of a hull with wings by the angles of the flow, as published for underwater gliders."""
+"""Forces and moments of a hull with wings from angle of attack and sideslip, as published for underwater gliders."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Polar(Term):
-    """Drag, side force, lift and moments by angle of attack a and sideslip b (Graver 2005; Zhang et al. 2013).
+    """Drag, side force, lift and moments from angle of attack a and sideslip b (Graver 2005; Zhang et al. 2013).
 
-    V is the speed of the body's origin through the water, a = atan2(w, u), b = asin(v / V). In the axes of the flow they are
-    drag (K_D0 + K_D a^2) V^2, side force K_b b V^2, lift (K_L0 + K_L a) V^2 and the moments (K_MR b + K_p p) V^2,
+    V is the speed of the body's origin through the water, a = atan2(w, u), b = asin(v / V). In flow axes, the drag is
+    (K_D0 + K_D a^2) V^2, the side force K_b b V^2 and the lift (K_L0 + K_L a) V^2. The moments are (K_MR b + K_p p) V^2,
     (K_M0 + K_M a + K_q q) V^2, (K_MY b + K_r r) V^2. Coefficients have their published signs and are 0 by default.
 
     Args:
         drag: K_D0 [kg/m].
         drag_by_attack: K_D [kg/m/rad2].
-        side_by_slip: K_b [kg/m/rad]: below 0 where the force is against the sideslip.
+        side_by_slip: K_b [kg/m/rad]; a negative value opposes the sideslip.
         lift: K_L0 [kg/m].
         lift_by_attack: K_L [kg/m/rad].
         roll_by_slip: K_MR [kg/rad].
         pitch: K_M0 [kg].
-        pitch_by_attack: K_M [kg/rad]: below 0 where the hull turns into the flow.
-        yaw_by_slip: K_MY [kg/rad]: above 0 where the hull turns into the flow.
-        moment_by_rate: K_p, K_q, K_r, (3,) [kg s/rad]: below 0 where they brake.
+        pitch_by_attack: K_M [kg/rad]; a negative value turns the hull into the flow.
+        yaw_by_slip: K_MY [kg/rad]; a positive value turns the hull into the flow.
+        moment_by_rate: K_p, K_q, K_r, (3,) [kg s/rad]; negative values damp the rotation.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -77,7 +77,7 @@ STEP, STILL, LEAST_PART = 1e-6, 1e-30, 1e-3
 
 
 def wrench(numbers: Numbers, twist: np.ndarray) -> np.ndarray:
-    """Force and moment (n, 6) [N, N m] about the body's origin at velocities (n, 6) [m/s, rad/s], by the axes of the flow."""
+    """Force and moment (n, 6) [N, N m] in body axes about the body's origin, at velocities (n, 6) [m/s, rad/s]."""
     nu, rate = twist[:, :3], twist[:, 3:]
     u, v, w = nu.T
     plane, speed = np.hypot(u, w), np.linalg.norm(nu, axis=1)

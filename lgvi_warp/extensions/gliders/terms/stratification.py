@@ -17,13 +17,13 @@ from lgvi_warp.physics.terms.base import CONSERVED, Array, Numbers, Packed, Pack
 class Stratification(Term):
     """Buoyancy that varies with depth: B (1 + gradient x) (1 - compressibility x), x = d - reference_depth.
 
-    B is the vehicle's buoyancy, d the depth of the centre of buoyancy.
+    B is the vehicle's buoyancy, and d the depth of the centre of buoyancy.
 
     Args:
-        gradient: Relative change of buoyancy per depth [1/m]: positive where denser water lies below. With
-            `compressibility` it is the change due to the water alone; without, the water's change minus that of the hull's
-            volume.
-        reference_depth: Depth [m] at which buoyancy is B; 0 by default.
+        gradient: Relative change of buoyancy per depth [1/m], positive if denser water lies below. With `compressibility`,
+            it is the change due to the water alone. Without `compressibility`, it is the net change due to the water and
+            the hull's volume.
+        reference_depth: Depth [m] at which the buoyancy is B; 0 by default.
         compressibility: Relative loss of the hull's volume per depth [1/m] (Eriksen et al. 2001); none by default.
 
     Examples:
@@ -78,7 +78,7 @@ class Stratification(Term):
 
 
 def _deviation(numbers: Numbers, buoyancy: Array) -> tuple[Array, Array | None]:
-    """Stiffness [N/m] and curve [N/m2] of B's deviation, stiffness x - curve x^2; None for a hull without compressibility."""
+    """Stiffness [N/m] and curvature [N/m2] or None of the deviation from B, stiffness x - curvature x^2."""
     gradient = numbers["gradient"]
     if "compressibility" not in numbers:
         return buoyancy * gradient, None

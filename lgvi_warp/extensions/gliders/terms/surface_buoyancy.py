@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Buoyancy that fades as a hull comes out of the water."""
+"""Buoyancy that decreases as a hull comes out of the water."""
 
 from __future__ import annotations
 
@@ -26,24 +26,24 @@ STRETCH = {"box": 1.0, "circle": 4.0 / 3.0}
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SurfaceBuoyancy(Term):
-    """Buoyancy that fades as the hull comes out of the water, at the depth 0 or at the waves of the scene.
+    """Buoyancy that decreases as the hull comes out of the water. The surface is at depth 0 or at the scene's waves.
 
-    The vehicle's buoyancy is spread over parts of the hull, about its centre of buoyancy. Each part loses the buoyancy of
-    its section above the surface; a submerged hull keeps all of it. In still water the force has a potential.
+    The vehicle's buoyancy is distributed over parts of the hull, about its centre of buoyancy. Each part loses the buoyancy
+    of its section above the surface; a submerged hull keeps its full buoyancy. In still water the force has a potential.
 
     Args:
         heights: Height of the hull's sections, (k,) [m], linear between stations; one number for a hull of one part.
-        stations: Places along the body's x axis, (k,) [m], rising, from stern to bow. Only their distances count, since the
-            centroid of the volume is put at the centre of buoyancy. With one station, the default, the hull is one part: it
-            heaves and does not pitch.
-        section: "circle", the default, a round hull, whose sections grow as the square of the height; or "box", as broad above
-            as below, whose sections grow as the height.
+        stations: Positions along the body's x axis, (k,) [m], rising, from stern to bow. Only their distances count, since
+            the centroid of the volume is placed at the centre of buoyancy. With one station, the default, the hull is one
+            part: the surface affects its heave but not its pitch.
+        section: "circle", the default, for a round hull, whose sections grow as the square of the height; or "box", for
+            vertical sides, whose sections grow as the height.
 
     Raises:
-        SceneError: If stations do not rise, or two neighbours have no height; or a number is invalid (see `Term`).
+        SceneError: If stations do not rise, two neighbouring heights are 0, or a number is invalid (see `Term`).
 
     Examples:
-        A ball of 100 N in 80 N of water.
+        A ball with a weight of 80 N and a buoyancy of 100 N if submerged.
 
         >>> import lgvi_warp as lw
         >>> ball = lw.Vehicle(8.0, inertia=[0.1, 0.1, 0.1], added_mass=[4.0, 4.0, 4.0], buoyancy=100.0)
@@ -114,11 +114,11 @@ class SurfaceBuoyancy(Term):
 
         Args:
             numbers: The term's numbers by field, each of shape (n, ...).
-            buoyancy: The vehicle's, (n,) [N].
+            buoyancy: Buoyancy of the vehicle, (n,) [N].
 
         Returns:
-            (n, parts, 6): place from the centre of buoyancy [m], buoyancy [N], half-height [m] and its inverse, and tilt and
-            stretch of the vertical extent c H, c^2 = 1 - tilt a^2 + stretch a^4, a the sine of the pitch.
+            (n, parts, 6): position relative to the centre of buoyancy [m], buoyancy [N], half-height [m] and its inverse, and
+            `tilt` and `stretch` of the vertical extent c H, with c^2 = 1 - tilt a^2 + stretch a^4, a the sine of the pitch.
         """
         x, heights, buoyancy = numbers["stations"], numbers["heights"], buoyancy[:, None]
         if x.shape[1] == 1:
@@ -151,7 +151,7 @@ class SurfaceBuoyancy(Term):
 
 
 def _lost(section: str, u: Array) -> tuple[Array, Array]:
-    """The share of a section above the water, and the moment of the part below about its middle over its half-height."""
+    """Share of a section above the water, and moment of the submerged part about the middle, divided by the half-height."""
     if section == "box":
         return 0.5 * (1.0 - u), 0.25 * (1.0 - u**2)
     w = np.sqrt(1.0 - u**2)
@@ -159,6 +159,6 @@ def _lost(section: str, u: Array) -> tuple[Array, Array]:
 
 
 def _no_volume(heights: np.ndarray) -> np.ndarray:
-    """Mask (n,) of hulls (n, k) of which a part has no height."""
+    """Mask (n,) of hulls with heights (n, k) in which some part has no height."""
     tallest = heights if heights.shape[1] == 1 else np.maximum(heights[:, 1:], heights[:, :-1])
     return np.any(~(tallest > 0.0), axis=1)

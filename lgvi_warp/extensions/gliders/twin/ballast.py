@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Volumes displaced beside those of the vehicle."""
+"""Volumes displaced in addition to the vehicle's hull."""
 
 import numpy as np
 
@@ -10,9 +10,9 @@ from lgvi_warp.reference.terms.following import Following
 
 
 class Ballast(Following):
-    """position (n, 3) [m]; density [kg/m3], gravity [m/s2]; times (k,) [s] and command (k, n) [m3]; more as in `Following`.
+    """Ballast: position (n, 3) [m]; density [kg/m3], gravity [m/s2]; times (k,) [s], command (k, n) [m3]; see `Following`.
 
-    profile: None, or the twin of a `density_profile`, whose densities then act.
+    profile: None, or the twin of a `density_profile`, whose densities replace `density`.
     """
 
     profile: DensityProfile | None = None
@@ -27,7 +27,7 @@ class Ballast(Following):
         return np.asarray(sum(forces)), torque
 
     def potential(self, view: View) -> float:
-        """U = rho g V times the depth of each point [J], of volumes that are held."""
+        """U, the sum of rho g V times the depth of each point [J], for constant volumes."""
         if len(self.times) > 1:
             return 0.0
         depths = view.b[2] + self.position @ view.down

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A buoyancy engine: a pump between two volumes that turns at two depths."""
+"""A buoyancy engine: a pump between two volumes that reverses at two depths."""
 
 import numpy as np
 
@@ -9,10 +9,10 @@ from lgvi_warp.reference.terms import Law, View
 
 
 class BuoyancyEngine(Law):
-    """Numbers as those of `lw.terms.BuoyancyEngine`; density [kg/m3], gravity [m/s2]; profile as in `Ballast`.
+    """Numbers of `lw.terms.BuoyancyEngine`; density [kg/m3], gravity [m/s2]; `profile` as in `Ballast`.
 
-    Memory: the volume now; 1 up, -1 down; volume and depth at the last look; the time since then, -1 before the first; with
-    an efficiency the pressure at the last look [N/m2].
+    Memory: the present volume; the direction, 1 up or -1 down; volume and depth at the last evaluation; the time since then,
+    -1 before the first; with an efficiency, the pressure at the last evaluation [N/m2].
     """
 
     first = "down"
@@ -22,7 +22,7 @@ class BuoyancyEngine(Law):
     profile: DensityProfile | None = None
 
     def wrench(self, view: View) -> tuple[Array, Array]:
-        """-rho (1 + gradient (d - reference_depth)) g V R^T e3 at the position, d its depth."""
+        """-rho (1 + gradient (d - reference_depth)) g V R^T e3 at the volume's position, whose depth is d."""
         depth = view.b[2] + view.down @ self.position
         density = self.density * (1.0 + self.gradient * (depth - self.reference_depth))
         if self.profile is not None:
@@ -31,17 +31,17 @@ class BuoyancyEngine(Law):
         return f, cross(self.position, f)
 
     def start(self) -> Array:
-        """At rest at its first volume."""
+        """Memory at the start: the first volume, with the pump at rest."""
         rows = [self.volume_start, 1.0 if self.first == "up" else -1.0, self.volume_start, 0.0, -1.0]
         return np.array(rows if self.efficiency is None else [*rows, 0.0])
 
     def pumped(self, volume: float, side: float, time: float) -> float:
-        """The volume after a time towards the one for this side."""
+        """The volume after pumping for a time towards the volume of a direction."""
         goal, most = self.volume_up if side > 0.0 else self.volume_down, self.pump_rate * time
         return float(volume + np.clip(goal - volume, -most, most))
 
     def met(self, view: View, time: float) -> float | None:
-        """Time after the last look at which a straight line met the depth where it turns, `time` being since then; or None."""
+        """Time after the last evaluation, at most `time`, at which a linear path met the turning depth; or None."""
         _, side, _, before, since, *_ = view.memory
         depth, before = view.b[2], view.b[2] if since < 0.0 else before
         end = self.depth_top if side > 0.0 else self.depth_bottom
@@ -50,7 +50,7 @@ class BuoyancyEngine(Law):
         return float(time * (end - before) / (depth - before)) if -side * (before - end) <= 0.0 else 0.0
 
     def looked(self, view: View, time: float) -> tuple[float, float]:
-        """(volume, side) after `time` more than at the last look."""
+        """(volume, direction) at `time` after the last evaluation."""
         _, side, volume, _, since, *_ = view.memory
         time += max(since, 0.0)
         until = self.met(view, time)
@@ -59,7 +59,7 @@ class BuoyancyEngine(Law):
         return self.pumped(self.pumped(volume, side, until), -side, time - until), -side
 
     def evolve(self, view: View, second: bool) -> Array:
-        """The volume in the middle of the kick, and then the look."""
+        """Memory with the volume in the middle of the kick; on the second call, an evaluation of the depth."""
         half = 0.5 * view.h
         volume, side = self.looked(view, half)
         if not second:
@@ -67,7 +67,7 @@ class BuoyancyEngine(Law):
         return np.array([self.pumped(volume, side, half), side, volume, view.b[2], half, *view.memory[5:]])
 
     def follow(self, view: View) -> Array:
-        """A look at this stage."""
+        """Memory after an evaluation of the depth at this stage."""
         volume, side = self.looked(view, view.h)
         pressure = [] if self.efficiency is None else [self.pressure(view)]
         return np.array([volume, side, volume, view.b[2], 0.0, *pressure])
@@ -82,7 +82,7 @@ class BuoyancyEngine(Law):
         )
 
     def spent(self, view: View, memory: Array) -> float:
-        """p dV / efficiency of what the pump pushed out: see the device code."""
+        """Energy p dV / efficiency of the volume that the pump pushed out: see the device code."""
         if self.efficiency is None or memory[3:5].tolist() == view.memory[3:5].tolist():
             return 0.0
         _, side, volume, _, since, before = view.memory

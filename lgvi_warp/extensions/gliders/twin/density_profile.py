@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Density of the water by depth."""
+"""Density of the water against depth."""
 
 import numpy as np
 
@@ -11,13 +11,13 @@ NODES, WEIGHTS = np.polynomial.legendre.leggauss(2)
 
 
 class DensityProfile(Law):
-    """Numbers as those of `lw.terms.DensityProfile`; buoyancy [N], center_of_buoyancy (3,) [m], density rho0 [kg/m3]."""
+    """Numbers of `lw.terms.DensityProfile`; buoyancy [N], center_of_buoyancy (3,) [m], density rho0 [kg/m3]."""
 
     compressibility, reference_depth = 0.0, 0.0
 
     @property
     def potential_force(self) -> bool:  # type: ignore[override]
-        """Whether the hull is stiff."""
+        """Whether the hull is incompressible, so that the force has a potential."""
         return self.compressibility == 0.0
 
     def density_at(self, depth: float) -> float:
@@ -35,13 +35,13 @@ class DensityProfile(Law):
         return total if depth > 0.0 else -total
 
     def wrench(self, view: View) -> tuple[Array, Array]:
-        """f = -(rho(d) g V (1 - compressibility (d - reference_depth)) - B) R^T e3, V = B / (rho0 g)."""
+        """f = -(rho(d) g V (1 - compressibility (d - reference_depth)) - B) R^T e3, with V = B / (rho0 g)."""
         depth = float(view.b[2] + view.down @ self.center_of_buoyancy)
         share = self.density_at(depth) / self.density * (1.0 - self.compressibility * (depth - self.reference_depth))
         f = np.asarray(-self.buoyancy * (share - 1.0) * view.down)
         return f, cross(self.center_of_buoyancy, f)
 
     def potential(self, view: View) -> float:
-        """U = V g column - B d [J], of a stiff hull."""
+        """U = V g column - B d [J], for an incompressible hull."""
         depth = float(view.b[2] + view.down @ self.center_of_buoyancy)
         return float(self.buoyancy * (self.column(depth) / self.density - depth))

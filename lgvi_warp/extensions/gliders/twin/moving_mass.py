@@ -12,9 +12,10 @@ from lgvi_warp.reference.terms.wrench import at_time
 
 
 class MovingMass(Following):
-    """Numbers as those of `lw.terms.MovingMass`, with gravity [m/s2], and those of `Following` where it is driven.
+    """Numbers of `lw.terms.MovingMass`, with gravity [m/s2], and those of `Following` if a controller drives it.
 
-    inertia: whether it is kept up. The memory then ends with the mean velocity in the vehicle over the last step, 0 at first.
+    inertia: Whether the inertia moves with the mass. The memory then ends with the mean velocity of the mass in the vehicle
+    over the last step, 0 at the start.
     """
 
     slide_direction: Array | None = None
@@ -24,25 +25,25 @@ class MovingMass(Following):
 
     @property
     def moves(self) -> bool:
-        """Whether channels of a controller remember: all do that have inertia."""
+        """Whether commanded channels have a memory; all channels of a mass with inertia have one."""
         return self.driven and (self.inertia or super().moves)
 
     def start(self) -> Array:
-        """Memory of channels, and no velocity."""
+        """Memory at the start: that of the channels, and a velocity of 0."""
         return np.concatenate([super().start() if self.driven else np.zeros(0), np.zeros(3 * self.inertia)])
 
     def _halves(self, view: View) -> tuple[View, Array]:
-        """A view with the memory of channels alone, and the rest of the memory."""
+        """A view with only the memory of the channels, and the rest of the memory."""
         count = len(view.memory) - 3 * self.inertia
         return replace(view, memory=view.memory[:count]), view.memory[count:]
 
     def follow(self, view: View) -> Array:
-        """Memory of channels, if a controller drives them."""
+        """Memory at this stage; channels change if a controller drives them."""
         own, rest = self._halves(view)
         return np.concatenate([super().follow(own) if self.driven else own.memory, rest])
 
     def where(self, view: View) -> Array:
-        """The place r (3,) [m] of the mass: along its path, then slid, then turned."""
+        """Position r (3,) [m] of the mass: on its path, then slid, then turned."""
         r = at_time(view.t, self.times, self.places, False)
         if not self.driven:
             return r
@@ -57,18 +58,18 @@ class MovingMass(Following):
         return np.asarray(r)
 
     def wrench(self, view: View) -> tuple[Array, Array]:
-        """No force, and the torque by which the weight m g R^T e3 at r differs from that at the reference place."""
+        """Zero force, and the torque of the weight m g R^T e3 at r minus its torque at the reference position."""
         return np.zeros(3), cross(self.where(view) - self.reference, self.mass * self.gravity * view.down)
 
     def carried(self, view: View) -> tuple[Array, Array]:
-        """Kinetic energy m |nu + Om x r + v|^2 / 2 less that of a mass at the reference place: its matrix, its linear part."""
+        """Matrix and linear part of the kinetic energy m |nu + Om x r + v|^2 / 2 minus that at the reference position."""
         if not self.inertia:
             return super().carried(view)
         here, home = (np.hstack([np.eye(3), -hat(r)]) for r in (self.where(view), self.reference))
         return self.mass * (here.T @ here - home.T @ home), self.mass * here.T @ self._halves(view)[1]
 
     def depart(self, view: View) -> Array:
-        """The mean velocity of the step."""
+        """Memory with the mean velocity over the step."""
         if not self.inertia:
             return view.memory
         later = replace(view, t=view.t + view.h)

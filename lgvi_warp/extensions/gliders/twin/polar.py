@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Forces and moments of a hull with wings by the angles of the flow."""
+"""Forces and moments of a hull with wings from angle of attack and sideslip."""
 
 import numpy as np
 
@@ -11,10 +11,10 @@ LEAST_PART = 1e-3
 
 
 class Polar(Law):
-    """Numbers as those of `lw.terms.Polar`, about the body's origin."""
+    """Numbers of `lw.terms.Polar`, about the body's origin."""
 
     def damping(self, view: View) -> Array:
-        """-D (nu; Om): along the axes of the flow x, y, z. Along y and z by antisymmetric matrices, which do no work."""
+        """D, so that the wrench is -D (nu; Om). Side force and lift use antisymmetric matrices, which do no work."""
         V, (u, v, w) = float(np.linalg.norm(view.nu)), view.nu
         if V == 0.0:
             return np.zeros((6, 6))

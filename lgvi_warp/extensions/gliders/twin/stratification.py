@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Buoyancy that varies with depth: its deviation from the constant."""
+"""Buoyancy that varies with depth: its deviation from the constant buoyancy."""
 
 import numpy as np
 
@@ -8,13 +8,13 @@ from lgvi_warp.reference.terms import Law, View
 
 
 class Stratification(Law):
-    """Numbers as those of `lw.terms.Stratification`; buoyancy [N], center_of_buoyancy (3,) [m, body]."""
+    """Numbers of `lw.terms.Stratification`; buoyancy [N], center_of_buoyancy (3,) [m, body axes]."""
 
     potential_force = True
     compressibility = 0.0
 
     def excess_depth(self, view: View) -> float:
-        """d - d0 of the centre of buoyancy [m]."""
+        """Depth d of the centre of buoyancy minus d0 [m]."""
         return float(view.b[2] + view.R[2] @ self.center_of_buoyancy - self.reference_depth)
 
     def wrench(self, view: View) -> tuple[Array, Array]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Buoyancy that a hull loses where it is above the surface, part by part."""
+"""Buoyancy that each part of a hull loses above the surface."""
 
 import math
 from collections.abc import Iterator
@@ -14,22 +14,22 @@ AXIS = np.array([1.0, 0.0, 0.0])
 
 
 class SurfaceBuoyancy(Law):
-    """Numbers as those of `lw.terms.SurfaceBuoyancy`; buoyancy [N], center_of_buoyancy (3,) [m]; waves: twins, if any."""
+    """Numbers of `lw.terms.SurfaceBuoyancy`; buoyancy [N], center_of_buoyancy (3,) [m]; `waves`: twins of waves, if any."""
 
     section = "circle"
     waves: tuple[Waves, ...] = ()
 
     @property
     def potential_force(self) -> bool:  # type: ignore[override]
-        """Whether the surface is still."""
+        """Whether the surface is still, so that the force has a potential."""
         return not self.waves
 
     def beside(self, laws: tuple[Law, ...]) -> Law:
-        """The same law below the waves among some laws."""
+        """The same law below those of the given laws that are waves."""
         return type(self)(**vars(self) | {"waves": tuple(law.beside(laws) for law in laws if isinstance(law, Waves))})
 
     def parts(self) -> Iterator[tuple[float, float, float, float]]:
-        """Parts of the hull: place from the centre of buoyancy [m], buoyancy [N], height [m], and length [m]; 0: of any."""
+        """Parts of the hull: position from the centre of buoyancy [m], buoyancy [N], height, length [m] (0 for one part)."""
         if len(self.stations) == 1:
             yield 0.0, float(self.buoyancy), float(self.heights[0]), 0.0
             return
@@ -47,7 +47,7 @@ class SurfaceBuoyancy(Law):
             yield x - middle, self.buoyancy * share / volume, height, length
 
     def extent(self, along: float, height: float, length: float) -> tuple[float, float]:
-        """The vertical extent of a part over its height, and its derivative by `along`, the sine of the axis' pitch."""
+        """Vertical extent of a part divided by its height, and the derivative by `along`, the sine of the axis's pitch."""
         if length == 0.0:
             return 1.0, 0.0
         stretch = (length / height) ** 2 * (4.0 / 3.0 if self.section == "circle" else 1.0)
@@ -55,7 +55,7 @@ class SurfaceBuoyancy(Law):
         return c, (2.0 * stretch * along**3 - along) / c
 
     def lost(self, place: float) -> tuple[float, float]:
-        """The part of a section above the water, and the moment of what is below, in half-heights; place in them, too."""
+        """Share of a section above the water, and moment of the submerged part; lengths are in units of the half-height."""
         u = min(max(place, -1.0), 1.0)
         if self.section == "box":
             return 0.5 * (1.0 - u), 0.25 * (1.0 - u**2)
@@ -63,7 +63,7 @@ class SurfaceBuoyancy(Law):
         return (math.acos(u) - u * w) / math.pi, 2.0 * w**3 / (3.0 * math.pi)
 
     def swell(self, view: View, point: Array) -> tuple[float, Array]:
-        """Elevation of the surface above a point [m], and acceleration of the waves' water there (3,) over gravity."""
+        """Elevation of the surface above a point [m], and acceleration of the water there (3,) divided by gravity."""
         elevation, acceleration = 0.0, np.zeros(3)
         for wave in self.waves:
             place = View(view.R, view.b + view.R @ point, view.nu, view.Om, view.t)
@@ -72,7 +72,7 @@ class SurfaceBuoyancy(Law):
         return elevation, acceleration
 
     def wrench(self, view: View) -> tuple[Array, Array]:
-        """The lost buoyancy, along the gradient of the pressure; and the moment of sections that are below in part."""
+        """The lost buoyancy along the pressure gradient, and the moment of partly submerged sections."""
         force, torque = np.zeros(3), np.zeros(3)
         for x, buoyancy, height, length in self.parts():
             point = self.center_of_buoyancy + x * AXIS
@@ -86,7 +86,7 @@ class SurfaceBuoyancy(Law):
         return force, torque
 
     def potential(self, view: View) -> float:
-        """U [J], the energy of lifting what is above still water out of it."""
+        """U [J], the energy to lift the part of the hull above still water out of it."""
         total = 0.0
         for x, buoyancy, height, length in self.parts():
             depth = view.b[2] + view.down @ (self.center_of_buoyancy + x * AXIS)

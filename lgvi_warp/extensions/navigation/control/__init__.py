@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Parts of a controller, one file each."""
+"""Parts of a controller for inertial navigation, one file each."""

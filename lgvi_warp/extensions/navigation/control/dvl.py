@@ -28,36 +28,37 @@ FARTHEST = 2e4
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class DVL(MeasuringPart):
-    """Doppler velocity log with four beams in a cross: each measures the velocity over ground of its place along it.
+    """Doppler velocity log with four beams in a cross; each beam measures the log's velocity over ground along the beam.
 
         reading_i = u_i . (nu + Omega x place) + noise xi_i
         u_i = (+-sin(angle) / sqrt(2), +-sin(angle) / sqrt(2), cos(angle))
 
     A beam has no echo if it is lost by chance, points upward, or has no floor (flat or on a grid) within its range, or if
-    the body is tilted too far. An `error_state_filter` uses each beam by itself, so a single beam is useful, too. Without a
-    filter the measured velocity is that of the log's place, by least squares of three or four beams. With fewer beams there
-    is no bottom lock: the last velocity is kept, 0 before the first.
+    the body is tilted too far. An `error_state_filter` uses each beam separately, so even a single beam helps. Without a
+    filter, the measured velocity is the velocity of the point `place`, by least squares from three or four beams. With
+    fewer beams there is no bottom lock, and the last velocity is kept; it is 0 before the first lock.
 
     Args:
-        place: Place of the log (3,) [m], body axes; 0 by default.
+        place: Position of the log (3,) [m], body axes; 0 by default.
         angle: Angle of the beams from the body's third axis [rad]; 30 degrees by default.
-        noise: Standard deviation along a beam [m/s]; 0 by default.
-        dropout: Probability with which a beam is lost at a tick; 0 by default.
+        noise: Standard deviation of the velocity along a beam [m/s]; 0 by default.
+        dropout: Probability that a beam is lost at a tick; 0 by default.
         burst: Mean length of a run of losses of a beam [ticks], as in `lw.control.Sensor`; by default losses are
             independent.
-        outlier: Probability with which the reading of a beam is an outlier, each by itself; by default none is.
-        outlier_std: Standard deviation of what an outlier adds to it [m/s].
+        outlier: Probability that the reading of a beam is an outlier, independently for each beam; by default no outliers.
+        outlier_std: Standard deviation of the error that an outlier adds to the reading [m/s].
         every: Ticks from one new reading to the next, a whole number; 1 by default.
-        floor: Key of the scene's `lw.events.Floor` that is the ground; "" by default: always an echo.
-        least_range: Shortest way along a beam to the floor [m]; 0 by default.
-        greatest_tilt: Angle of the body's third axis from straight down above which no beam has an echo [rad]; by default any.
-        greatest_range: Longest way along a beam to the floor [m]; inf by default.
-        silent_from: Time from which it gives no readings [s]; inf by default, never.
-        silent_to: Time until which it gives none [s]; inf by default, to the end.
+        floor: Key of the scene's `lw.events.Floor` that reflects the beams; with "", the default, every beam has an echo.
+        least_range: Shortest distance along a beam to the floor [m]; 0 by default.
+        greatest_tilt: Largest angle of the body's third axis from straight down at which beams have echoes [rad]; by default
+            there is no limit.
+        greatest_range: Longest distance along a beam to the floor [m]; inf by default.
+        silent_from: Time from which the log gives no readings [s]; inf by default, for never.
+        silent_to: Time until which the log gives no readings [s]; inf by default, for the end of the run.
 
     Raises:
-        SceneError: If `every` is no whole number, or a range or a silence ends before it begins; or a number is invalid
-            (see `Term`). A scene refuses a log whose floor is none of its events.
+        SceneError: If `every` is not a whole number, the range or the silent time ends before it begins, or a number is
+            invalid (see `Term`). A scene refuses a log if `floor` is not one of its events.
 
     Examples:
         >>> import lgvi_warp as lw

@@ -43,7 +43,7 @@ _KEY = "give the name of a sensor that stands before the filter, or leave it out
 
 
 def _sensor(default: str = "") -> Any:
-    """The key of a sensor."""
+    """A field for the key of a sensor."""
     return text("is not a text", _KEY, default)
 
 
@@ -51,45 +51,45 @@ def _sensor(default: str = "") -> Any:
 class ErrorStateFilter(MeasuringPart):
     """An error-state Kalman filter of 15 states: position, velocity, attitude, biases of accelerometers and gyroscopes.
 
-    List it after the sensors that it names. These pass their readings to the filter alone, and it replaces the measured
-    position, attitude, velocity over ground and angular velocity by its estimate. At each tick the IMU's increments
-    propagate the estimate; then each new reading updates it, number by number in Joseph's form. A delayed fix updates a
-    copy of the position made when the fix was taken, with its covariances (stochastic cloning); up to 8 fixes may be
-    pending. The filter assumes the scene's noises of its sensors for all members, times `process_scale` and
-    `measurement_scale`. It estimates the biases of the IMU, and models no other bias, drift or quantum.
+    List it after the sensors that it names. These sensors pass their readings only to the filter. The filter replaces the
+    measured position, attitude, velocity over ground and angular velocity by its estimate. At each tick the IMU's
+    increments propagate the estimate. Then each new reading updates it, number by number in Joseph's form. A delayed fix
+    updates a copy of the position and its covariances made when the fix was taken (stochastic cloning); up to 8 fixes may
+    be pending. For all members, the filter assumes the sensor noise of the scene, times `process_scale` and
+    `measurement_scale`. It estimates the biases of the IMU, and models no other bias, drift or rounding.
 
     The first estimate is the truth plus an error with the standard deviations below, drawn once for each member.
 
-    Sola (2017), arXiv:1711.02508, chapters 5 and 6; Roumeliotis & Burdick (2002) for the copy.
+    Sources: Sola (2017), arXiv:1711.02508, chapters 5 and 6; Roumeliotis & Burdick (2002) for stochastic cloning.
 
     Args:
         imu: Key of an `IMU`; "imu" by default.
-        dvl: Key of a `DVL`; "", the default, for none; the same for the following keys.
+        dvl: Key of a `DVL`; "", the default, for none. The following keys are "" by default, too.
         depth: Key of a `Sensor` of "depth".
         heading: Key of a `Sensor` of "heading".
-        fix: Key of a `Sensor` of "position" without latency, as GPS with `deepest`.
-        delayed_fix: Key of a `Sensor` of "position" whose `latency` is below 8 times its `every`, as USBL. If a member's
-            numbers give more pending fixes than the scene's, the filter ignores the excess.
-        position_sigma: Standard deviation of the first position (3,) [m], inertial axes; 1 by default; one number for all
-            axes.
-        velocity_sigma: The same of the velocity (3,) [m/s], inertial axes; 0.1 by default.
-        attitude_sigma: The same of the attitude (3,) [rad], body axes; 0.02 by default.
-        accelerometer_sigma: Standard deviation of the accelerometers' bias, whose first estimate is 0 (3,) [m/s^2]; 0.02 by
+        fix: Key of a `Sensor` of "position" without latency, such as GPS with `deepest`.
+        delayed_fix: Key of a `Sensor` of "position" whose `latency` is below 8 times its `every`, such as USBL. If a
+            member's numbers give more pending fixes than the scene's numbers, the filter ignores the excess.
+        position_sigma: Standard deviation of the first position (3,) [m], inertial axes, or one number for all axes; 1 by
             default.
-        gyroscope_sigma: The same of the gyroscopes (3,) [rad/s]; 1e-3 by default.
-        start_error: Factor of the error of the first position, velocity and attitude; 1 by default, 0 for the truth.
-        process_scale: Factor of the IMU's noises and walks that the filter assumes; 1 by default.
-        measurement_scale: Factor of the other noises; 1 by default.
-        gate: Standard deviations of an innovation beyond which it is rejected, each number of a reading by itself: a beam, a
-            coordinate of a fix. One number, or five (5,), for dvl, fix, delayed_fix, depth and heading; inf takes all. By
-            default there is no gate.
-        most_rejected: Number of consecutive rejections of one number after which the next reading is accepted: the
+        velocity_sigma: Standard deviation of the first velocity (3,) [m/s], inertial axes; 0.1 by default.
+        attitude_sigma: Standard deviation of the first attitude (3,) [rad], body axes; 0.02 by default.
+        accelerometer_sigma: Standard deviation of the accelerometers' bias (3,) [m/s^2], whose first estimate is 0; 0.02 by
+            default.
+        gyroscope_sigma: Standard deviation of the gyroscopes' bias (3,) [rad/s], whose first estimate is 0; 1e-3 by default.
+        start_error: Factor on the error of the first position, velocity and attitude; 1 by default, 0 for the truth.
+        process_scale: Factor on the IMU's noise and bias walk that the filter assumes; 1 by default.
+        measurement_scale: Factor on the noise of the other sensors that the filter assumes; 1 by default.
+        gate: Largest innovation that is accepted, in its standard deviations, for each number of a reading separately, such
+            as a beam or a coordinate of a fix. Give one number, or five (5,), for dvl, fix, delayed_fix, depth and heading;
+            inf accepts all. By default there is no gate.
+        most_rejected: Number of consecutive rejections of one number after which the next reading is accepted. The
             covariance is first enlarged along the measured direction, until the innovation is at the gate. 10 by default,
             inf for never.
-        report: Whether it records sigmas, innovations, NEES and NIS for signals and statistics; True by default.
+        report: Whether the filter records sigmas, innovations, NEES and NIS for signals and statistics; True by default.
 
     Raises:
-        SceneError: If a number is invalid (see `Term`); and where a sensor that it names is missing, of another kind or
+        SceneError: If a number is invalid (see `Term`), or a sensor that the filter names is missing, of another kind or
             without noise.
 
     Examples:
@@ -153,17 +153,17 @@ class ErrorStateFilter(MeasuringPart):
 
     @property
     def belief_rows(self) -> int:  # type: ignore[override]
-        """Rows of the bus with what it believes."""
+        """Number of rows of the bus with the filter's state."""
         return BELIEF_ROWS + self.rejected_rows + DIVERGED_ROWS if self.report else 0
 
     @property
     def rejected_rows(self) -> int:  # type: ignore[override]
-        """Rows of these with the counts of rejected readings, by sensor."""
+        """Number of these rows that count rejected readings, by sensor."""
         return len(AIDS) if self.report and self.gate is not None else 0
 
     @property
     def copies(self) -> int:
-        """Fixes that may be on their way at once by the numbers of the scene; 1 without a delayed fix."""
+        """Number of fixes that may be pending at once with the scene's numbers; 1 without a delayed fix."""
         late = self.used.get("delayed_fix")
         return _on_their_way(late) if late is not None else 1
 
@@ -184,7 +184,7 @@ class ErrorStateFilter(MeasuringPart):
             faults.add("sensors", key, problem, "put it behind the filter, or let the filter use it")
 
     def _check_sensor(self, faults: Faults, role: str, key: str, before: Mapping[str, Any]) -> None:
-        """Add a fault where a sensor does not fit its role."""
+        """Add a fault if a sensor does not fit its role."""
         kind, reading = ROLES[role]
         word, sensor = f"{self.key}.{role}", before.get(key)
         what = f"a sensor of {reading}" if reading else f"a part of type {kind.type}"
@@ -244,7 +244,7 @@ class ErrorStateFilter(MeasuringPart):
         return Packed(values | rows, memory=memory)
 
     def _gates(self, numbers: Numbers) -> dict[str, Any]:
-        """Gate of each sensor, and the mean square of a consistent filter's innovations that pass, in their variances."""
+        """Gate of each sensor, and mean square of a consistent filter's accepted innovations, relative to their variance."""
         if self.gate is None:
             return {}
         from scipy.special import erf
@@ -258,14 +258,14 @@ class ErrorStateFilter(MeasuringPart):
         return values
 
     def _process(self, numbers: Numbers) -> dict[str, Any]:
-        """Variances over a period of what the IMU gains, and of the walks of its biases, as the filter believes them."""
+        """Variances that the filter assumes for the IMU's increments and for its bias walks over a period."""
         unit, scale = self.used["imu"], numbers["process_scale"][:, None]
         named = {"gained_q": "accelerometer_noise", "turned_q": "gyroscope_noise"}
         named |= {"bias_a_q": "accelerometer_walk", "bias_w_q": "gyroscope_walk"}
         return {name: self.bus.period * (scale * getattr(unit, noise)) ** 2 for name, noise in named.items()}
 
     def _readings(self, numbers: Numbers, context: PackingContext) -> dict[str, Any]:
-        """Variances of readings as the filter believes them, and where its sensors are."""
+        """Variances that the filter assumes for readings, and positions of its sensors."""
         scale, used = numbers["measurement_scale"], self.used
         values: dict[str, Any] = {}
         for role in AIDS:
@@ -283,11 +283,11 @@ class ErrorStateFilter(MeasuringPart):
 
 
 def _on_their_way(sensor: Any) -> int:
-    """Count of fixes of a sensor that may be on their way at once."""
+    """Number of fixes of a sensor that may be pending at once."""
     return 1 + int(np.rint(sensor.latency) // np.rint(sensor.every))
 
 
 def _noise(sensor: Any) -> np.ndarray:
-    """The standard deviation of a reading as the scene gives it: its noise, and what rounding adds."""
+    """Standard deviation of a reading with the scene's numbers, from its noise and its rounding."""
     noise = np.asarray(sensor.noise)
     return np.sqrt(noise**2 + sensor.quantum**2 / 12.0) if isinstance(sensor, Sensor) else noise

@@ -26,28 +26,28 @@ ROWS, BIAS_ROWS = 18, slice(12, 18)
 class IMU(MeasuringPart):
     """Inertial measurement unit: increments of velocity and rotation from one tick to the next, with errors.
 
-    It sums the motion over the whole period between two ticks, like a unit that corrects for coning and sculling:
+    It integrates the motion over the whole period between two ticks, like a unit that corrects for coning and sculling:
 
         turn     = log(R_k-1^T R_k) + T b_w + sqrt(T) gyroscope_noise xi
         velocity = R_k-1^T (v_k - v_k-1 - g T) + T b_a + sqrt(T) accelerometer_noise xi,   in the axes of the last tick
         b <- b + sqrt(T) walk xi,   starting at bias + turn_on xi, drawn once for each member
 
-    T is the period of the controller, v the velocity over ground of the unit's place, xi standard normals that follow from the
-    seed, the member, the tick and the unit's name. The Allan variance is noise^2 / t + walk^2 t / 3 (IEEE Std 952-1997).
-    An `error_state_filter` uses its increments. Without a filter the unit replaces the measured angular velocity by its
-    mean over the last period. In that case list a `DVL` before the unit: a later `DVL` would use this mean in place of the
-    true rate.
+    T is the period of the controller, and v the velocity over ground of the unit's position. xi are standard normal numbers
+    that follow from the seed, the member, the tick and the unit's name. The Allan variance is noise^2 / t + walk^2 t / 3
+    (IEEE Std 952-1997). An `error_state_filter` uses the increments. Without a filter, the unit replaces the measured
+    angular velocity by its mean over the last period. In that case list a `DVL` before the unit: a later `DVL` would use
+    this mean instead of the true rate.
 
     Args:
-        place: Place of the unit (3,) [m], body axes; 0 by default.
-        accelerometer_noise: Noise density (3,) [m/s^1.5]: m/s^2 per root of Hz; 0 by default; one number for all axes.
+        place: Position of the unit (3,) [m], body axes; 0 by default.
+        accelerometer_noise: Noise density (3,) [m/s^1.5, which is m/s^2 per Hz^1/2], or one number for all axes; 0 by default.
         gyroscope_noise: Noise density (3,) [rad/s^1/2]; 0 by default.
         accelerometer_walk: Random walk of the bias (3,) [m/s^2.5]; 0 by default.
         gyroscope_walk: Random walk of the bias (3,) [rad/s^1.5]; 0 by default.
-        accelerometer_bias: Steady bias (3,) [m/s^2]; 0 by default.
-        gyroscope_bias: Steady bias (3,) [rad/s]; 0 by default.
-        accelerometer_turn_on: Standard deviation of the bias of each member at the start (3,) [m/s^2]; 0 by default.
-        gyroscope_turn_on: The same of the gyroscopes (3,) [rad/s]; 0 by default.
+        accelerometer_bias: Constant bias (3,) [m/s^2]; 0 by default.
+        gyroscope_bias: Constant bias (3,) [rad/s]; 0 by default.
+        accelerometer_turn_on: Standard deviation of the accelerometers' bias at the start (3,) [m/s^2]; 0 by default.
+        gyroscope_turn_on: Standard deviation of the gyroscopes' bias at the start (3,) [rad/s]; 0 by default.
 
     Raises:
         SceneError: If a number is invalid (see `Term`).

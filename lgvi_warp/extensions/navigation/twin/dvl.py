@@ -24,11 +24,11 @@ def beams(angle: float) -> Array:
 
 
 class DVL(Part):
-    """Numbers as those of `lw.control.DVL`; floor [m], the depth of a flat floor, inf for none; keys of its random numbers.
+    """Numbers of `lw.control.DVL`; floor [m], the depth of a flat floor, inf for none; keys of its random numbers.
 
-    ground: None, or a `Ground`, a floor on a grid, at which a beam looks for 20 km at most.
+    ground: None, or a `Ground`, a floor on a grid, which a beam searches up to 20 km.
 
-    handed: None, or {name: what is handed on}, shared by sensors and filter.
+    handed: None, or {name: readings passed on}, shared by sensors and filter.
     """
 
     key, handed, ground = "dvl", None, None
@@ -40,7 +40,7 @@ class DVL(Part):
     seed0 = seed1 = channel = 0
 
     def begin(self) -> None:
-        """No reading yet: a velocity of 0."""
+        """Set the velocity to 0 before the first reading."""
         self.last: Array = np.zeros(3)
         self.losses = [Losses(self.dropout, self.burst) for _ in AZIMUTHS]
 
@@ -62,7 +62,7 @@ class DVL(Part):
         return kept & (y.tick % self.every == 0)
 
     def measure(self, y: Measurement) -> Measurement:
-        """Hand the beams on, or let y have the velocity that follows from three of them or four; else the last one."""
+        """Pass the beams on, or give y the velocity from three or four beams, or else the last velocity."""
         directions = beams(self.angle)
         four, sizes, strays = (
             normals(self.seed0, self.seed1, y.member, y.tick, self.channel + stream) for stream in (0, 2, 3)

@@ -33,14 +33,14 @@ def right_jacobian(w: Array) -> Array:
 
 
 class ErrorStateFilter(Part):
-    """Numbers as those of `lw.control.ErrorStateFilter`, and what it believes of its sensors.
+    """Numbers of `lw.control.ErrorStateFilter`, and the sensor noise that the filter assumes.
 
-    imu, dvl, depth, heading, fix, delayed_fix: keys of the sensors in `handed`; "" for none.
-    believed: deviations: of accelerometer_noise, accelerometer_walk, gyroscope_noise, gyroscope_walk, fix, delayed_fix
-    (3,), of dvl, depth, heading one number. place, dvl_place, fix_place, delayed_fix_place, depth_place (3,): of the IMU and
-    of these; dvl_angle [rad].
-    latency: ticks of the delayed fix; copies: how many may be on their way. errors: (9,) standard normals, the error of the
-    first estimate. gate: (5,) of the sensors in the order of INNOVATIONS; None for none.
+    imu, dvl, depth, heading, fix, delayed_fix: Keys of the sensors in `handed`; "" for none.
+    believed: Assumed standard deviations: (3,) each for accelerometer_noise, accelerometer_walk, gyroscope_noise,
+    gyroscope_walk, fix, delayed_fix; one number each for dvl, depth, heading. place, dvl_place, fix_place, delayed_fix_place,
+    depth_place (3,): Positions of the IMU and of these sensors; dvl_angle [rad].
+    latency: Ticks of the delayed fix; copies: Number of fixes that may be pending. errors: (9,) standard normal numbers for
+    the error of the first estimate. gate: (5,), for the sensors in the order of INNOVATIONS; None for no gate.
     """
 
     imu = dvl = depth = heading = fix = delayed_fix = ""
@@ -52,20 +52,20 @@ class ErrorStateFilter(Part):
     errors = np.zeros(9)
 
     def begin(self) -> None:
-        """No estimate yet."""
+        """Begin without an estimate."""
         self.P: Any = None
         self.size = 15 + 3 * self.copies
         self.rejected, self.runs = np.zeros(5), np.zeros(12)
         self.begin_tick()
 
     def begin_tick(self) -> None:
-        """No error yet, and no innovation."""
+        """Clear the error state and the innovations."""
         self.x = np.zeros(self.size)
         self.innovation, self.innovation_sigma = np.zeros(12), np.zeros(12)
         self.nis, self.nis_count = 0.0, 0
 
     def start(self, y: Measurement) -> None:
-        """The truth with errors as large as the filter believes."""
+        """Start at the truth plus errors with the standard deviations that the filter assumes."""
         sigmas = self.position_sigma, self.velocity_sigma, self.attitude_sigma
         error = self.start_error * np.concatenate(sigmas) * self.errors
         p, v, R = self.of_imu(y)
@@ -79,12 +79,12 @@ class ErrorStateFilter(Part):
         self.P[:15, :15] = np.diag(spread**2)
 
     def of_imu(self, y: Measurement) -> tuple[Array, Array, Array]:
-        """Position and velocity of the unit's place, inertial, and the attitude."""
+        """Position and velocity of the IMU in inertial axes, and the attitude."""
         v = y.velocity + np.cross(y.angular_velocity, self.place)
         return y.position + y.R @ self.place, y.R @ v, y.R
 
     def propagate(self, T: float) -> None:
-        """Over one period, by what the unit has gained (Sola, section 5.4, with the velocity's mean for the position)."""
+        """Propagate over one period by the IMU's increments (Sola, section 5.4; the position uses the mean velocity)."""
         unit, b = self.handed[self.imu], self.believed
         gained, turned = unit["gained"] - T * self.a, unit["turned"] - T * self.w
         g = np.array([0.0, 0.0, self.gravity])
@@ -105,7 +105,7 @@ class ErrorStateFilter(Part):
         self.rate, self.mean = 1.5 * turned / T - 0.5 * self.mean, turned / T
 
     def update(self, slot: int, h: Array, difference: float, sigma: float) -> None:
-        """One number measured: Joseph's form. difference: of it from what the estimate before all updates would measure."""
+        """Update by one measured number in Joseph's form. difference: Number minus its prediction before all updates."""
         r = (self.measurement_scale * sigma) ** 2
         innovation = float(difference - h @ self.x)
         s = h @ self.P @ h + r
@@ -127,7 +127,7 @@ class ErrorStateFilter(Part):
         self.nis_count += 1
 
     def passes(self, slot: int, g: float, h: Array, innovation: float, r: float) -> bool:
-        """Whether a number is taken; after too many rejections in a row it is, with a covariance that makes it fit."""
+        """Whether a number is accepted; after too many rejections in a row it is, and the covariance is enlarged to fit."""
         seen = h @ self.P @ h
         if innovation**2 <= g**2 * (seen + r):
             self.runs[slot] = 0
@@ -143,7 +143,7 @@ class ErrorStateFilter(Part):
         return True
 
     def by_position(self, now: slice, i: int, place: Array) -> Array:
-        """Row that maps the error to number i of the position of a sensor's `place`; `now`: P, or that as a fix was sent."""
+        """Row from the error to coordinate i of the position of `place`; `now`: the present position or a fix's copy."""
         h = np.zeros(self.size)
         h[now.start + i] = 1.0
         if now == P:
@@ -151,11 +151,11 @@ class ErrorStateFilter(Part):
         return h
 
     def at(self, place: Array) -> Array:
-        """The position (3,) of a sensor's place."""
+        """The position (3,) in inertial axes of a sensor at `place`."""
         return self.p + self.R @ (place - self.place)
 
     def by_beam(self, u: Array) -> tuple[float, Array]:
-        """The velocity along a beam, and how it follows from the error."""
+        """The velocity along a beam, and the row from the error to it."""
         V_body, arm, h = self.R.T @ self.v, self.dvl_place - self.place, np.zeros(self.size)
         h[V], h[THETA], h[W] = self.R @ u, np.cross(u, V_body), np.cross(u, arm)
         return float(u @ (V_body + np.cross(self.rate, arm))), h
@@ -168,7 +168,7 @@ class ErrorStateFilter(Part):
         return h / (R[0, 0] ** 2 + R[1, 0] ** 2)
 
     def correct(self, y: Measurement) -> None:
-        """All that has been measured at this tick, one number after another."""
+        """Update by all readings of this tick, one number after another."""
         self.begin_tick()
         if self.dvl:
             read = self.handed[self.dvl]
@@ -198,9 +198,9 @@ class ErrorStateFilter(Part):
         self.inject()
 
     def correct_by_delayed(self) -> None:
-        """Correct by a delayed fix: copy the position with its covariances as it is sent; correct the copy as it arrives.
+        """Correct by a delayed fix: copy the position and covariances when it is sent; correct the copy when it arrives.
 
-        Stochastic cloning: Roumeliotis & Burdick 2002. The first copy that is free takes a fix; a fix that finds none is lost.
+        This is stochastic cloning (Roumeliotis & Burdick 2002). The first free copy takes a fix; a fix without one is lost.
         """
         read = self.handed[self.delayed_fix]
         new, place = read["fresh"], self.delayed_fix_place
@@ -232,14 +232,14 @@ class ErrorStateFilter(Part):
         self.P = G @ self.P @ G.T
 
     def error(self, y: Measurement) -> Array:
-        """The truth less the estimate (15,)."""
+        """The truth minus the estimate (15,)."""
         p, v, R = self.of_imu(y)
         unit = self.handed[self.imu]
         biases = unit["bias_a"] - self.a, unit["bias_w"] - self.w
         return np.concatenate([p - self.p, v - self.v, turn_to(self.R, R), *biases])
 
     def measure(self, y: Measurement) -> Measurement:
-        """The estimate in place of the motion: position, attitude, velocity and angular velocity."""
+        """Replace the measured position, attitude, velocity and angular velocity by the estimate."""
         if self.P is None:
             self.start(y)
         else:

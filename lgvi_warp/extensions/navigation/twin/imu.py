@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""An inertial measurement unit: what its accelerometers and gyroscopes add up to from one tick to the next."""
+"""An inertial measurement unit: increments of its accelerometers and gyroscopes from one tick to the next."""
 
 from dataclasses import replace
 from typing import Any
@@ -13,10 +13,10 @@ from lgvi_warp.reference.rotation import Array
 
 
 class IMU(Part):
-    """Numbers as those of `lw.control.IMU`, each (3,), with gravity [m/s^2], and the keys of its random numbers.
+    """Numbers of `lw.control.IMU`, each (3,), with gravity [m/s^2], and the keys of its random numbers.
 
-    accelerometer_start, gyroscope_start: (3,), the biases at the first tick beyond the steady ones, as they were drawn.
-    handed: None, or {name: what is handed on}, shared by sensors and filter.
+    accelerometer_start, gyroscope_start: (3,), drawn biases at the first tick, in addition to the constant biases.
+    handed: None, or {name: readings passed on}, shared by sensors and filter.
     """
 
     key, handed = "imu", None
@@ -26,17 +26,17 @@ class IMU(Part):
     seed0 = seed1 = channel_accelerometer = channel_gyroscope = 0
 
     def begin(self) -> None:
-        """No motion seen yet; the biases are those of the start."""
+        """Begin without a previous motion, with the biases at the start."""
         self.last: tuple[Array, Array] | None = None
         self.bias_a: Any = self.accelerometer_bias + self.accelerometer_start
         self.bias_w: Any = self.gyroscope_bias + self.gyroscope_start
 
     def drawn(self, y: Measurement, channel: int, stream: int) -> Array:
-        """Three standard normals of this tick."""
+        """Three standard normal numbers of this tick."""
         return normals(self.seed0, self.seed1, y.member, y.tick, channel + stream)[:3]
 
     def measure(self, y: Measurement) -> Measurement:
-        """Hand on the velocity and the turn gained since the last tick, in the axes of the last tick, with their errors."""
+        """Pass on the increments of velocity and rotation since the last tick, in its axes, with their errors."""
         v = y.R @ (y.velocity + np.cross(y.angular_velocity, self.place))
         gained, T = np.zeros(3), y.period
         turned: Any = np.zeros(3)

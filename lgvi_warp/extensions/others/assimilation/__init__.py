@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Assimilation: members that follow what was measured, and learn numbers on the way."""
+"""Data assimilation: filters correct members by measurements and estimate numbers of the scene."""

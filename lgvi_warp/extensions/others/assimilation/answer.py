@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The answer of an assimilation: where the members are, how sure they are, and what they learned."""
+"""The result of an assimilation: states of the members, their uncertainty, and the learned numbers."""
 
 from __future__ import annotations
 
@@ -24,30 +24,30 @@ MOST_NAMED = 2
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Assimilated(Summarized, Saved):
-    """Members after each measurement that they assimilated: means, spreads, innovations, learned numbers.
+    """Members after each assimilated measurement: means, standard deviations, innovations, learned numbers.
 
     Attributes:
         time: Times of the measurements (k,) [s].
-        mean: Means after them, weighted with particles: position (k, 3) [m], velocity and angular_velocity (k, 3) [m/s, rad/s,
-            body axes], attitude (k, 3, 3), and the learned numbers by name, (k, ...).
-        std: Standard deviations of the same; of the attitude (k, 3) [rad], about the body's axes.
-        innovations: By name of the series, values less predictions (k, m); NaN where it has none.
-        innovation_std: Their expected standard deviations, (k, m): root of the sum of the predictions' variance and the
-            instrument's.
-        whitened: Innovations over the root of their covariance, (k, m), by name of the series.
-        left_out: By name of the series, the times at which the gate left it out, (k,), True or False.
-        log_likelihood: Logarithm of the probability density of all measured values, each given those before it; without those
-            that the gate left out. Scenes that follow the same series may be compared by it.
+        mean: Means after the measurements, weighted with particles: position (k, 3) [m], velocity (k, 3) [m/s] and
+            angular_velocity (k, 3) [rad/s] in body axes, attitude (k, 3, 3), and the learned numbers by name, (k, ...).
+        std: Standard deviations of the same quantities; those of the attitude are (k, 3) [rad], about the body's axes.
+        innovations: {series: measured minus predicted values (k, m)}; NaN if a series has no value at a time.
+        innovation_std: Expected standard deviations of the innovations, (k, m): square root of the predictions' variance plus
+            the instrument's variance.
+        whitened: {series: innovations multiplied by the inverse square root of their covariance (k, m)}.
+        left_out: {series: whether the gate left its values out at each time (k,)}.
+        log_likelihood: Logarithm of the probability density of all measured values, each given the values before it, without
+            values left out by the gate. It can be used to compare scenes that assimilate the same series.
         inflation: Factor on the covariance of the members before each measurement, (k,).
-        effective: Effective number of members before resampling, (k,), where copies of one member count once; with Kalman
-            filters their number.
-        ancestors: Number of members of the beginning from which those after each measurement come, (k,).
-        final: Where the members are at the end, from which a run can go on.
-        parameters: The learned numbers of the members at the end, by name, (n, ...), as
-            `run.states(final, parameters=parameters)` takes them.
+        effective: Effective number of members before resampling, (k,); copies of one member count once. With Kalman filters
+            it is the number of members.
+        ancestors: Number of initial members from which the members after each measurement descend, (k,).
+        final: Final states of the members, from which a run can continue.
+        parameters: The learned numbers of the members at the end, {name: (n, ...)}, for
+            `run.states(final, parameters=parameters)`.
         weights: Weights of the members at the end, (n,), with the sum 1.
         method: Name of the filter.
-        messages: Remarks on how far the result can be relied on.
+        messages: Remarks on the reliability of the result.
         provenance: Scene, ensemble, settings, versions and machine.
         units: Units of the learned numbers by name.
     """
@@ -86,7 +86,7 @@ class Assimilated(Summarized, Saved):
         return repr(self).splitlines()
 
     def summary_rows(self) -> tuple[str, summaries.Rows]:
-        """Learned numbers, and the check of the innovations."""
+        """Rows of the summary: learned numbers, and the check of the innovations."""
         rows = [("method", self.method)]
         for name in self.parameters:
             rows.append((name, f"{_text(self.mean[name][-1])} +- {_text(self.std[name][-1])}"))
@@ -134,16 +134,16 @@ class Assimilated(Summarized, Saved):
             yield {"time": float(time), "effective": float(self.effective[k])} | entries
 
     def consistency(self, level: float = 0.95) -> dict[str, InnovationTest]:
-        """Compare innovations with what those of a consistent filter are: normal, of their own spread, independent in time.
+        """Test whether innovations are those of a consistent filter: normal, with the expected variance, independent in time.
 
         Args:
-            level: Probability that all of a consistent filter's numbers are inside their bands, in (0, 1); 0.95 by default.
+            level: Probability that all numbers of a consistent filter are inside their bands, in (0, 1); 0.95 by default.
 
         Returns:
-            By name of the series, root mean square, mean and correlation of the innovations with bands, and a verdict.
+            {series: test}, with the root mean square, mean and correlation of the innovations, their bands, and a verdict.
 
         Raises:
-            SceneError: If the level is not in (0, 1).
+            SceneError: If `level` is not in (0, 1).
         """
         faults = Faults()
         chance = faults.number("level", level)
@@ -161,7 +161,7 @@ class Assimilated(Summarized, Saved):
         return tests
 
     def table(self) -> Table:
-        """The learned numbers of the members as a design, whose runs begin with them.
+        """The learned numbers of the members as a design; runs with this design begin with these numbers.
 
         Returns:
             A table with a column for each number.
@@ -170,17 +170,17 @@ class Assimilated(Summarized, Saved):
 
 
 def _text(values: Any) -> str:
-    """A few numbers, to four digits."""
+    """A few numbers as text, to four digits."""
     return ", ".join(f"{value:.4g}" for value in np.atleast_1d(values).ravel())
 
 
 def _array(values: Any) -> np.ndarray:
-    """Numbers of a file, NaN where they were not finite."""
+    """Numbers of a file; those that were not finite are NaN."""
     return np.array(with_missing_as(values, np.nan), np.float64)
 
 
 def _packed(rows: np.ndarray) -> dict[str, Any]:
-    """An array to the bit, as texts: a run that goes on needs it so."""
+    """An array as texts that keep every bit, as needed to continue a run."""
     rows = np.ascontiguousarray(rows)
     return {"dtype": rows.dtype.str, "shape": list(rows.shape), "base64": base64.b64encode(rows.tobytes()).decode()}
 

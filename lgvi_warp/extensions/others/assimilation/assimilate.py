@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`assimilate`: members run from measurement to measurement, and a filter moves or weighs them at each."""
+"""`assimilate`: members run from measurement to measurement, where a filter moves or reweights them."""
 
 from __future__ import annotations
 
@@ -67,32 +67,33 @@ def assimilate(
 ) -> Assimilated:
     """Assimilate measurements: correct the members of a fleet by measured series, and estimate numbers of the scene.
 
-    The members are the prior: their starts and numbers vary by the uncertainty before the first measurement. They run to
-    each time of the series, where a filter updates them by the measured values. The memory of actuators and controllers
-    is not updated.
+    The members are the prior: their initial states and numbers vary by the uncertainty before the first measurement. They
+    run to each time of the series, where a filter updates them by the measured values. The memory of actuators and
+    controllers is not updated.
 
-    Learned numbers move in the normal scores of their own distribution, z = Phi^-1(F(x)) (Bertino, Evensen & Wackernagel
-    2003), so that each value is one that the distribution has: a log-normal number stays positive, a uniform one within its
-    bounds. Numbers that were given to the members as arrays have no distribution: they move as they are, or as their
-    logarithms if the scene refuses the other sign.
+    The filter updates learned numbers in the normal scores of their distribution, z = Phi^-1(F(x)) (Bertino, Evensen &
+    Wackernagel 2003). Every updated value is therefore a possible value of the distribution: a log-normal number stays
+    positive, and a uniform number within its bounds. Numbers that were given to the members as arrays have no distribution.
+    The filter updates their values, or their logarithms if the scene refuses the opposite sign.
 
     Args:
-        fleet: An Ensemble, or a Scene with its [ensemble]; of tens to thousands of members.
-        series: One or several lw.studies.Series, what instruments measured.
-        learn: Names of numbers that vary and are learned, such as ["current.velocity[0]"]; default none.
-        filter: "etkf", the default, an ensemble Kalman filter without draws (Bishop, Etherton & Majumdar 2001); "enkf", with a
-            measurement for each member (Burgers, van Leeuwen & Evensen 1998); both without localisation, for spreads that
-            are small enough for the motion to be nearly linear; "particles", a particle filter with systematic resampling
-            (Kitagawa 1996), for any spread.
+        fleet: An Ensemble, or a Scene with its [ensemble], of tens to thousands of members.
+        series: One or several lw.studies.Series, the measurements of the instruments.
+        learn: Names of varied numbers to estimate, such as ["current.velocity[0]"]; default none.
+        filter: "etkf", the default, is an ensemble Kalman filter without random draws (Bishop, Etherton & Majumdar 2001).
+            "enkf" perturbs the measurement for each member (Burgers, van Leeuwen & Evensen 1998). Both have no localisation
+            and suit spreads that are small enough for nearly linear motion. "particles" is a particle filter with systematic
+            resampling (Kitagawa 1996), for any spread.
         method: As in `lw.solve`.
         h: Step [s], which divides every time of the series; default that of the scene.
         dtype: As in `lw.solve`.
-        seed: Seed of what the filter draws.
-        discount: With particles and learned numbers, these and the states are drawn anew at each resampling, with their mean
-            and covariance (Liu & West 2001); a number between 1/3 and 1, or None to keep them; 0.99 by default.
-        gate: Largest distance of a value from its prediction, in standard deviations of the innovation; values beyond are left
-            out, with a message. Several values of one instrument take a chi-square test of the same probability. None takes
-            all; 5.0 by default.
+        seed: Seed of the filter's random draws.
+        discount: With particles and learned numbers, these numbers and the states are redrawn at each resampling with
+            unchanged mean and covariance (Liu & West 2001). Give a number between 1/3 and 1, or None for no redrawing; 0.99
+            by default.
+        gate: Largest distance of a value from its prediction, in standard deviations of the innovation; values beyond it are
+            left out, with a message. For several values of one instrument, a chi-square test of the same probability is
+            used. None accepts all values; 5.0 by default.
         inflation: Factor on the covariance of the members before each measurement, at least 1 (default), for Kalman filters
             that become overconfident; or "adaptive", which estimates it from the innovations (Anderson 2009, Miyoshi 2011).
         threads: As in `lw.solve`.
@@ -102,7 +103,7 @@ def assimilate(
         The members after each time, with means, standard deviations and innovations.
 
     Raises:
-        SceneError: If an argument is at fault, or if members fail under a Kalman filter.
+        SceneError: If an argument is invalid, or if members fail under a Kalman filter.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -176,7 +177,7 @@ def _targets(faults: Faults, fleet: Ensemble, learn: Sequence[str]) -> list[Targ
 
 @dataclass
 class _Steps:
-    """Prepared runs of a scene by their number of steps."""
+    """Prepared runs of a scene, by their number of steps."""
 
     scene: Any
     settings: dict[str, Any]
@@ -188,7 +189,7 @@ class _Steps:
         return step_of(self.scene, self.settings["h"])
 
     def run(self, seconds: float) -> Prepared:
-        """The run of so many seconds."""
+        """The prepared run of a given length in seconds."""
         count = round(seconds / self.h)
         if count not in self.runs:
             save = SaveAt(fields=FIELDS, final=True)
@@ -198,7 +199,7 @@ class _Steps:
 
 
 def _check_times(times: np.ndarray, steps: _Steps) -> None:
-    """Refuse times that are no whole number of steps."""
+    """Refuse times that are not a whole number of steps."""
     if times[0] <= 0.0:
         raise SceneError(
             ["series.time = 0 is where the members start. Give times after it, and what is known there as starts"]
@@ -214,7 +215,7 @@ def _check_times(times: np.ndarray, steps: _Steps) -> None:
 
 @dataclass
 class _Track:
-    """Members on their way, with what is noted after each measurement."""
+    """The members during the assimilation, with the records after each measurement."""
 
     fleet: Ensemble
     instruments: Sequence[Series]
@@ -254,7 +255,7 @@ class _Track:
         self.result: Any = None
 
     def _check_learned(self) -> None:
-        """Refuse to move what has separate values; tell what is learned beside what was asked for."""
+        """Refuse discrete numbers with a Kalman filter; add a message on numbers that are learned in addition."""
         if self.filter != "particles" and self.coordinates.separate.any():
             names = ", ".join(target.label for target in self.targets)
             problem = "has separate values, between which a Kalman filter cannot move it"
@@ -301,7 +302,7 @@ class _Track:
         self.log_weights = np.where(ended, -np.inf, self.log_weights)
 
     def measure(self, time: float) -> None:
-        """Bring the members to what was measured at a time [s], and note what that made of them."""
+        """Update the members by the measurements at a time [s], and record the result."""
         if self.inflation > 1.0:
             self._inflate()
         w = filters.normalised(self.log_weights)
@@ -342,7 +343,7 @@ class _Track:
         self._note()
 
     def _bound(self, count: int) -> float:
-        """The sum of squares of so many standard normals that is as improbable as one beyond the gate."""
+        """The sum of squares of `count` standard normal numbers that is as improbable as one number beyond the gate."""
         from scipy.stats import chi2, norm
 
         return float(chi2.isf(2.0 * norm.sf(self.gate), count))
@@ -354,14 +355,14 @@ class _Track:
         self.final = self.final.changed(**self.states)
 
     def _inflate(self) -> None:
-        """Move members away from their mean."""
+        """Move members away from their mean by the inflation."""
         n = self.fleet.members
         ensemble, centre = rows_of(self.states, self.learned, np.full(n, 1.0 / n))
         mean = ensemble.mean(axis=1, keepdims=True)
         self._take(mean + np.sqrt(self.inflation) * (ensemble - mean), centre)
 
     def _move(self, Y: np.ndarray, y: np.ndarray, sigma: np.ndarray) -> None:
-        """Kalman's update of states and learned numbers."""
+        """Kalman update of states and learned numbers."""
         w = np.full(self.fleet.members, 1.0 / self.fleet.members)
         self.log_likelihood += filters.whitened(*filters.innovation(Y, y, sigma, w))[2]
         ensemble, centre = rows_of(self.states, self.learned, w)
@@ -375,7 +376,7 @@ class _Track:
             self._next_inflation = filters.estimated_inflation(self.inflation, Y, y, sigma, INFLATION_VARIANCE)
 
     def _weigh(self, Y: np.ndarray, y: np.ndarray, sigma: np.ndarray) -> None:
-        """Weights by likelihood; members are drawn anew where few of them count."""
+        """Update the weights by the likelihood; resample the members if their effective number is small."""
         with np.errstate(divide="ignore"):
             before = np.log(filters.normalised(self.log_weights))
         self.log_weights = before + filters.log_likelihood(Y, y, sigma)
@@ -408,7 +409,7 @@ class _Track:
         self.log_weights = np.zeros(n)
 
     def _jitter(self, discount: float) -> None:
-        """Draw states and learned numbers anew, among members whose separate values are the same."""
+        """Redraw states and learned numbers, within groups of members with the same discrete values."""
         n = self.fleet.members
         ensemble, centre = rows_of(self.states, self.learned, np.full(n, 1.0 / n))
         moving = np.concatenate([np.full(len(ensemble) - len(self.learned), True), ~self.coordinates.separate])
@@ -420,7 +421,7 @@ class _Track:
         self._take(ensemble, centre)
 
     def _all_learned(self) -> bool:
-        """Whether members differ in nothing but what is drawn anew: states, and numbers that move."""
+        """Whether members differ only in states and learned numbers, which are redrawn."""
         learned, shapes = self.coordinates.targets, self.coordinates.shapes
         drawn = [each for law in self.fleet.variations for each in law.targets if each.name in shapes]
         covered = all(any(t.name == each.name and t.index in (None, each.index) for t in learned) for each in drawn)
@@ -428,12 +429,12 @@ class _Track:
         return covered and bool(learned) and names <= {target.name for target in learned}
 
     def _members_now(self) -> Any:
-        """The members where they are now, as a result that quantities read."""
+        """The members' present states, as a result that quantities can read."""
         samples = {name: values[None] for name, values in self.states.items()}
         return replace(self.result, samples={**self.result.samples, **samples}, time=self.result.time[-1:])
 
     def _note(self) -> None:
-        """Note means and standard deviations."""
+        """Record means and standard deviations."""
         w = filters.normalised(self.log_weights)
         live = w > 0.0
         w = w[live]
@@ -449,7 +450,7 @@ class _Track:
         self.inflation = self._next_inflation
 
     def answer(self, times: np.ndarray) -> Assimilated:
-        """The answer, once all measurements are in."""
+        """The result after all measurements."""
         mean, std = np.array(self.notes["mean"]), np.array(self.notes["std"])
         states = {name: slice(3 * i, 3 * i + 3) for i, name in enumerate(("position", "velocity", "angular_velocity"))}
         means: dict[str, np.ndarray] = {name: mean[:, at] for name, at in states.items()}
@@ -506,7 +507,7 @@ class _Track:
 
 
 def _doubts(finding: Assimilated) -> list[str]:
-    """Tell what the gate left out, and innovations that are not what they should be."""
+    """Messages on values left out by the gate, and on innovations that fail their tests."""
     doubts = []
     for name, test in finding.consistency().items():
         out = finding.left_out[name]

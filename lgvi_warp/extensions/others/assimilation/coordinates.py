@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Coordinates of learned numbers, in which a filter may move them anywhere: normal scores of their own distributions.
+"""Coordinates of learned numbers that a filter may change freely: normal scores of the numbers' distributions.
 
-A Kalman filter adds normal corrections. In normal scores z = Phi^-1(F(x)) every value is one that the distribution has:
-Gaussian anamorphosis (Bertino, Evensen & Wackernagel 2003, Int. Stat. Rev. 71). Scores of a normal number are its values but
-for scale and place, and those of a log-normal number its logarithm.
+A Kalman filter adds normal corrections. Every normal score z = Phi^-1(F(x)) belongs to a possible value of the distribution
+(Gaussian anamorphosis: Bertino, Evensen & Wackernagel 2003, Int. Stat. Rev. 71). The scores of a normal number are its
+values up to scale and shift, and those of a log-normal number are its logarithms up to scale and shift.
 """
 
 from __future__ import annotations
@@ -29,10 +29,10 @@ LEVELS = 400
 
 @dataclass(frozen=True, eq=False)
 class _Values:
-    """A number as it is, or by the logarithm of its size.
+    """Coordinates of a number that are its values, or the logarithms of their sizes.
 
-    at: (p, n), where it is at the start. sign: (p,), that of entries which move as logarithms, 0 for those that stay what they
-    are, NaN for others.
+    at: (p, n), coordinates at the start. sign: (p,), the sign of entries that move as logarithms, 0 for entries that are
+    constant, NaN for others.
     """
 
     target: Target
@@ -42,7 +42,7 @@ class _Values:
 
     @classmethod
     def of(cls, target: Target, values: np.ndarray, logarithmic: np.ndarray) -> _Values:
-        """Coordinates of values (n, ...); logarithmic: (p,), which entries move so."""
+        """Coordinates of values (n, ...); logarithmic: (p,), mask of the entries that move as logarithms."""
         rows = np.asarray(values, np.float64).reshape(len(values), -1).T
         sign = np.where(logarithmic, np.sign(rows[:, 0]), np.nan)
         with np.errstate(divide="ignore"):
@@ -60,9 +60,9 @@ class _Values:
 
 @dataclass(frozen=True, eq=False)
 class _Scores:
-    """Numbers that one distribution draws, by normal scores of the levels that they are drawn from.
+    """Coordinates of numbers that are normal scores of the uniform levels from which one distribution draws them.
 
-    columns: which levels move. entry: the only one of the numbers that is learned; None for all of them.
+    columns: Indices of the levels that move. entry: The only learned number of the distribution; None for all of them.
     """
 
     variation: Variation
@@ -72,7 +72,7 @@ class _Scores:
 
     @functools.cached_property
     def separate(self) -> bool:
-        """Whether the distribution chooses among separate values."""
+        """Whether the distribution is discrete."""
         for column in self.columns:
             u = np.full((LEVELS, self.variation.size), 0.5)
             u[:, column] = (np.arange(LEVELS) + 0.5) / LEVELS
@@ -94,12 +94,12 @@ class _Scores:
 
 
 class Coordinates:
-    """Rows of numbers that a filter moves, and the numbers of members that follow from them.
+    """Rows of coordinates that a filter changes, and the members' numbers that follow from them.
 
     Attributes:
         at: Rows (p, n) at the start.
-        targets: What is learned, and what is drawn together with it.
-        separate: (p,), rows of a distribution that chooses among separate values.
+        targets: Learned numbers, and the numbers drawn jointly with them.
+        separate: (p,), mask of the rows that belong to a discrete distribution.
     """
 
     def __init__(self, fleet: Ensemble, targets: Sequence[Target], parameters: Mapping[str, np.ndarray]):
@@ -126,7 +126,7 @@ class Coordinates:
         self.separate = np.repeat(np.array([part.separate for part in self._parts], bool), counts)
 
     def _entries(self, target: Target, laws: Sequence[Variation]) -> list[Target]:
-        """The target, or its entries where distributions draw these by themselves."""
+        """The target, or its entries if distributions draw them separately."""
         own = [each for law in laws for each in law.targets if each.name == target.name]
         if target.index is not None or not own or any(each.index is None for each in own):
             return [target]
@@ -135,7 +135,7 @@ class Coordinates:
         return [Target(target.name, place) for place in places]
 
     def values(self, rows: np.ndarray, parameters: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-        """The learned numbers by label, (n, ...), as `run.states` takes them; parameters: of the members, by name."""
+        """{label: learned numbers (n, ...)}, in the form that `run.states` takes; parameters: Members' numbers by name."""
         n, numbers = rows.shape[1], dict[str, np.ndarray]()
         for part, own in zip(self._parts, np.split(rows, self._ends) if self._parts else [], strict=True):
             for target, values in part.numbers(own, self.shapes):
@@ -147,7 +147,7 @@ class Coordinates:
         return {target.label: _of(target, numbers[target.name]) for target in self.targets}
 
     def groups(self, rows: np.ndarray) -> np.ndarray:
-        """Whole numbers from 0 (n,), the same for members whose separate values are the same."""
+        """Group indices from 0 (n,); members of a group have the same discrete values."""
         parts = [np.zeros((1, rows.shape[1]))]
         for part, own in zip(self._parts, np.split(rows, self._ends), strict=True):
             if part.separate:
@@ -156,7 +156,7 @@ class Coordinates:
 
 
 def _of(target: Target, rows: np.ndarray) -> np.ndarray:
-    """The target's values (n, ...) out of those of the whole number."""
+    """The target's values (n, ...), taken from those of the entire number."""
     index: tuple[Any, ...] = (slice(None), *(target.index or ()))
     return np.asarray(rows[index])
 
@@ -169,13 +169,13 @@ def _meet(first: Target, second: Target) -> bool:
 
 
 def _as_values(variation: Variation) -> bool:
-    """Whether the numbers of a distribution move as they are, or as logarithms."""
+    """Whether the coordinates of a distribution's numbers are their values or logarithms, not normal scores."""
     law = variation.distribution
     return law.kind in LINEAR or law.kind == LOGARITHMIC or (law.kind == OF_DRAWS and law.joint)
 
 
 def _scores(variation: Variation, target: Target, levels: np.ndarray) -> _Scores:
-    """The scores of the levels (n, size) of a distribution that the target depends on."""
+    """The scores of those levels (n, size) of a distribution on which the target depends."""
     from scipy.special import ndtri
 
     columns, entry = list(range(levels.shape[1])), None
@@ -186,7 +186,7 @@ def _scores(variation: Variation, target: Target, levels: np.ndarray) -> _Scores
 
 
 def _one_sided(scene: Any, target: Target, values: np.ndarray) -> np.ndarray:
-    """The entries (p,) of numbers without a distribution that keep their sign, since the scene refuses the other one."""
+    """Mask (p,) of entries without a distribution that must keep their sign, since the scene refuses the opposite sign."""
     rows = values.reshape(len(values), -1)
     signs = (np.sign(rows) == np.sign(rows[:1])).all(axis=0) & (rows[0] != 0.0) & (np.ptp(rows, axis=0) > 0.0)
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Update of an ensemble by a measurement, on arrays: ensemble Kalman filters, and weights of particles.
+"""Updates of an ensemble by a measurement, on arrays: ensemble Kalman filters, and weights of particles.
 
-An ensemble is (d, n), numbers by member; what it predicts of the measurements is (m, n). Measurements are (m,), their errors
-independent with standard deviations (m,).
+An ensemble is (d, n), with one column for each member; its predictions of the measurements are (m, n). Measurements are
+(m,), and their errors are independent with standard deviations (m,).
 """
 
 from __future__ import annotations
@@ -11,10 +11,10 @@ import numpy as np
 
 
 def etkf(ensemble: np.ndarray, predicted: np.ndarray, measured: np.ndarray, std: np.ndarray) -> np.ndarray:
-    """The ensemble transform filter: mean and covariance of Kalman's update, without draws.
+    """Ensemble transform Kalman filter: update with the mean and covariance of the Kalman filter, without random draws.
 
-    Source: Bishop, Etherton & Majumdar (2001), Mon. Wea. Rev. 129; the symmetric root of Wang, Bishop & Julier (2004), which
-    keeps the mean. With S = R^-1/2 Y' / sqrt(n - 1) = U s V^T it costs d n m.
+    Source: Bishop, Etherton & Majumdar (2001), Mon. Wea. Rev. 129, with the symmetric root of Wang, Bishop & Julier (2004),
+    which keeps the mean. With S = R^-1/2 Y' / sqrt(n - 1) = U s V^T the cost is d n m.
     """
     n = ensemble.shape[1]
     mean, centre = ensemble.mean(axis=1, keepdims=True), predicted.mean(axis=1)
@@ -29,9 +29,9 @@ def etkf(ensemble: np.ndarray, predicted: np.ndarray, measured: np.ndarray, std:
 def enkf(
     ensemble: np.ndarray, predicted: np.ndarray, measured: np.ndarray, std: np.ndarray, rng: np.random.Generator
 ) -> np.ndarray:
-    """The stochastic filter: every member is moved by Kalman's gain to a measurement with an error of its own.
+    """Stochastic ensemble Kalman filter: the Kalman gain moves every member towards a separately perturbed measurement.
 
-    Source: Burgers, van Leeuwen & Evensen (1998), Mon. Wea. Rev. 126. The errors drawn have the mean zero.
+    Source: Burgers, van Leeuwen & Evensen (1998), Mon. Wea. Rev. 126. The perturbations have the mean zero.
     """
     n = ensemble.shape[1]
     Y = predicted - predicted.mean(axis=1, keepdims=True)
@@ -43,7 +43,7 @@ def enkf(
 
 
 def log_likelihood(predicted: np.ndarray, measured: np.ndarray, std: np.ndarray) -> np.ndarray:
-    """Logarithm of the density of the measurements given each member, (n,); -inf where it is not known."""
+    """Logarithm of the density of the measurements given each member, (n,); -inf if a prediction is not finite."""
     with np.errstate(over="ignore", invalid="ignore"):
         total = -0.5 * np.sum(((measured[:, None] - predicted) / std[:, None]) ** 2, axis=0)
     constant = -np.sum(np.log(std)) - 0.5 * len(std) * np.log(2.0 * np.pi)
@@ -53,7 +53,7 @@ def log_likelihood(predicted: np.ndarray, measured: np.ndarray, std: np.ndarray)
 def innovation(
     predicted: np.ndarray, measured: np.ndarray, std: np.ndarray, weights: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Innovation (m,) and its covariance (m, m): the members' own, of weights (n,) with the sum 1, and the instrument's."""
+    """Innovation (m,) and its covariance (m, m): the members' covariance, with weights (n,), plus the instrument's."""
     counted = weights > 0.0
     w, Y = weights[counted], predicted[:, counted]
     apart = Y - (Y @ w)[:, None]
@@ -62,7 +62,7 @@ def innovation(
 
 
 def whitened(apart: np.ndarray, covariance: np.ndarray) -> tuple[np.ndarray, float, float]:
-    """Innovation (m,) over the root of its covariance, the sum of its squares, and the logarithm of its normal density."""
+    """Whitened innovation (m,), the sum of its squares, and the logarithm of the innovation's normal density."""
     root = np.linalg.cholesky(covariance)
     z = np.linalg.solve(root, apart)
     with np.errstate(over="ignore"):
@@ -73,13 +73,13 @@ def whitened(apart: np.ndarray, covariance: np.ndarray) -> tuple[np.ndarray, flo
 def estimated_inflation(
     factor: float, predicted: np.ndarray, measured: np.ndarray, std: np.ndarray, variance: float
 ) -> float:
-    """Factor on the members' covariance after one more measurement, at least 1.
+    """Inflation factor of the members' covariance after one more measurement, at least 1.
 
-    Innovations say what it should be, with a variance of their own; a Kalman filter of one number weighs that against the
-    factor so far. Source: Miyoshi (2011), Mon. Wea. Rev. 139, equations 6 to 9, after Anderson (2009), Tellus 61A; the
-    statistics of innovations are those of Desroziers et al. (2005).
+    Innovations give an estimate of the factor with a variance. A scalar Kalman filter combines this estimate with the present
+    factor. Source: Miyoshi (2011), Mon. Wea. Rev. 139, equations 6 to 9, after Anderson (2009), Tellus 61A; the statistics of
+    innovations are those of Desroziers et al. (2005).
 
-    factor: the one that the members already have. variance: of what is known of the factor.
+    factor: Factor already applied to the members. variance: Variance of the present factor.
     """
     count = len(measured)
     spread = float(np.sum(predicted.var(axis=1, ddof=1) / std**2))
@@ -91,7 +91,7 @@ def estimated_inflation(
 
 
 def normalised(log_weights: np.ndarray) -> np.ndarray:
-    """Weights (n,) with the sum 1 from their logarithms; equal ones where all are zero."""
+    """Weights (n,) with the sum 1 from their logarithms; equal weights if all are zero."""
     most = log_weights.max()
     if not np.isfinite(most):
         return np.full(len(log_weights), 1.0 / len(log_weights))
@@ -100,15 +100,15 @@ def normalised(log_weights: np.ndarray) -> np.ndarray:
 
 
 def effective_number(weights: np.ndarray, origins: np.ndarray) -> float:
-    """1 / sum w^2 of weights (n,) with the sum 1: as many members of equal weight would say as much (Kish 1965).
+    """Effective number of members, 1 / sum w^2 of weights (n,) with the sum 1 (Kish 1965).
 
-    origins: whole numbers (n,), the same for copies of one member, which count once, with the sum of their weights.
+    origins: Whole numbers (n,), equal for copies of one member. Copies count once, with the sum of their weights.
     """
     return float(1.0 / np.sum(np.bincount(origins, weights) ** 2))
 
 
 def resampled(weights: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Systematic resampling (Kitagawa 1996): indices (n,), i about n w_i times, in rising order."""
+    """Systematic resampling (Kitagawa 1996): rising indices (n,), in which i occurs about n w_i times."""
     n = len(weights)
     places = (rng.uniform() + np.arange(n)) / n
     steps = np.cumsum(weights)
@@ -117,7 +117,7 @@ def resampled(weights: np.ndarray, rng: np.random.Generator) -> np.ndarray:
 
 
 def jittered(numbers: np.ndarray, discount: float, rng: np.random.Generator) -> np.ndarray:
-    """Numbers (d, n) drawn to their mean and spread anew, with the mean and the covariance that they have.
+    """Numbers (d, n), shrunk towards their mean and then perturbed, with unchanged mean and covariance.
 
     Source: Liu & West (2001), Combined parameter and state estimation in simulation-based filtering.
     """

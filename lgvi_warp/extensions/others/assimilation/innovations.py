@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests of innovations: with a consistent filter they are standard normal by their covariance, and independent in time."""
+"""Tests of innovations: those of a consistent filter, normalised by their covariance, are independent standard normal."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ class InnovationTest(Summarized):
     Attributes:
         count: Number of values that were compared.
         left_out: Number of values that the gate left out, which are not compared.
-        ratio: Root mean square of the innovations over what their covariance says, 1 for a consistent filter.
-        ratio_band: Lower and upper end of its band (2,).
-        mean: Mean of each component's innovations over their standard deviations (m,), 0 for a consistent filter.
-        mean_band: Half width of its band (m,).
-        correlation: Correlation of innovations with those of the measurement before, 0 for a consistent filter.
-        correlation_band: Half width of its band.
+        ratio: Root mean square of the innovations divided by its value from their covariance, 1 for a consistent filter.
+        ratio_band: Lower and upper end of the band of `ratio` (2,).
+        mean: Mean of each component's innovations divided by their standard deviations (m,), 0 for a consistent filter.
+        mean_band: Half width of the band of `mean` (m,).
+        correlation: Correlation of innovations with those of the previous measurement, 0 for a consistent filter.
+        correlation_band: Half width of the band of `correlation`.
         level: Probability that a consistent filter is inside all of these bands.
-        verdict: The finding in words: "consistent", or what is outside its band.
+        verdict: "consistent", or the numbers that are outside their bands.
     """
 
     count: int
@@ -39,7 +39,7 @@ class InnovationTest(Summarized):
 
     @property
     def verdict(self) -> str:
-        """The finding in words."""
+        """Verdict of the test: "consistent", or the numbers that are outside their bands."""
         if not self.count:
             return "nothing to compare"
         found = {
@@ -65,10 +65,11 @@ class InnovationTest(Summarized):
 
 
 def tested(normalised: np.ndarray, whitened: np.ndarray, left_out: int, level: float) -> InnovationTest:
-    """Test innovations over their deviations (k, m), and the same over the root of their covariance; NaN where there is none.
+    """Test innovations, normalised by standard deviations (k, m) and whitened by their covariance; NaN for missing values.
 
-    The bands share the probability 1 - level equally (Bonferroni), the mean's by component. That of the correlation is the
-    normal one: N normal numbers over their length are uniform on the sphere, where products have the variance 1 / (N (N + 2)).
+    The bands share the probability 1 - level equally (Bonferroni), that of the mean over its components. The band of the
+    correlation is normal: N normal numbers divided by their length are uniform on the sphere, where products have the
+    variance 1 / (N (N + 2)).
     """
     from scipy.stats import chi2, norm
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Members as columns of numbers that a filter moves: states, attitudes about their mean, and the numbers to learn."""
+"""Members as columns of numbers for a filter: states, attitudes relative to their mean, and learned numbers."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def mean_attitude(attitude: np.ndarray, weights: np.ndarray) -> np.ndarray:
 
 
 def rotation_vectors(attitude: np.ndarray) -> np.ndarray:
-    """Axes times angles (n, 3) of rotations (n, 3, 3)."""
+    """Rotation vectors (n, 3) of rotations (n, 3, 3)."""
     q = notation.quaternion_from_matrix(attitude)
     size = np.linalg.norm(q[:, 1:], axis=1, keepdims=True)
     angle = 2.0 * np.arctan2(size, q[:, :1])
@@ -30,14 +30,17 @@ def rotation_vectors(attitude: np.ndarray) -> np.ndarray:
 def rows_of(
     states: Mapping[str, np.ndarray], learned: np.ndarray, weights: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(ensemble (d, n), mean attitude): position, velocity, angular velocity, turn from the mean attitude, learned numbers."""
+    """Ensemble (d, n) of position, velocity, angular velocity, rotation from the mean attitude and learned numbers.
+
+    The mean attitude is the second result.
+    """
     centre = mean_attitude(states["attitude"], weights)
     turns = rotation_vectors(np.einsum("ji,njk->nik", centre, states["attitude"]))
     return np.concatenate([*(states[name].T for name in VECTORS), turns.T, learned]), centre
 
 
 def states_of(ensemble: np.ndarray, centre: np.ndarray) -> tuple[dict[str, np.ndarray], np.ndarray]:
-    """(states (n, ...) by field, learned numbers (p, n)) of an ensemble (d, n)."""
+    """States {field: (n, ...)} and learned numbers (p, n) of an ensemble (d, n)."""
     states = {name: ensemble[3 * i : 3 * i + 3].T.copy() for i, name in enumerate(VECTORS)}
     attitude = centre @ matrix_from_rotation_vector(ensemble[9:12].T)
     # Products of rotations, but for round-off, which a run would refuse after many updates.

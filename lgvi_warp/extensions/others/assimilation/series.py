@@ -23,14 +23,14 @@ class Series:
     """Values that an instrument measured, with independent normal errors.
 
     Args:
-        of: What it measures: "position", "depth", "velocity", "euler[2]", a Quantity or a function, as in `lw.prepare`.
-        time: Rising times (k,) [s], from 0.
-        values: Measured values, (k,) or (k, m) of m numbers; NaN for one that is missing.
+        of: Measured quantity: "position", "depth", "velocity", "euler[2]", a Quantity or a function, as in `lw.prepare`.
+        time: Rising times (k,) [s], at least 0.
+        values: Measured values, (k,) or (k, m) of m numbers; NaN for a missing value.
         std: Standard deviation of the errors, a number or (m,), in the unit of the values.
-        name: Its name in the answer; by default that of what it measures.
+        name: Name of the series in the result; by default the name of the quantity.
 
     Raises:
-        SceneError: If an argument is at fault; the message names every fault.
+        SceneError: If an argument is invalid; the message lists every fault.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -72,12 +72,12 @@ class Series:
 
     @property
     def quantity(self) -> OfResult:
-        """Measured quantity, as one of a result."""
+        """The measured quantity, as a quantity of a result."""
         return quantities(self.of)[0]
 
     @property
     def label(self) -> str:
-        """Its name."""
+        """The name of the series."""
         return self.name or self.quantity.label
 
     def at(self, time: float) -> np.ndarray | None:
@@ -87,20 +87,20 @@ class Series:
             time: The time [s].
 
         Returns:
-            Values (m,), or None where nothing was measured then.
+            Values (m,), or None if there is no measurement at this time.
         """
         rows = rows_at(self.time, time)
         return np.asarray(self.values[rows[0]]) if len(rows) else None
 
     def near(self, measured: np.ndarray, predicted: np.ndarray) -> np.ndarray:
-        """Move predictions of angles by whole turns, to within half a turn of what was measured.
+        """Shift predictions of angles by whole turns, to within half a turn of the measured values.
 
         Args:
             measured: Measured values (m,).
-            predicted: What n members predict of them, (m, n).
+            predicted: Predictions of the values by n members, (m, n).
 
         Returns:
-            The predictions, (m, n); of what is no angle as they were.
+            The shifted predictions, (m, n); predictions of other quantities are unchanged.
         """
         if self.quantity.label not in ANGLES:
             return predicted

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Linear model predictive control as a law."""
+"""Linear model predictive control as a control law."""
 
 from __future__ import annotations
 
@@ -40,10 +40,10 @@ OF_OUTPUTS = ("outputs", "output_limit", "excess_cost")
 
 
 class Condensed(NamedTuple):
-    """A problem of a horizon in its inputs alone, v (k,), each a part of its limit.
+    """The condensed problem of a horizon: a quadratic program in the inputs v (k,), each divided by its limit.
 
     cost: H (k, k) of v H v / 2 + f v. slope: f = slope (x, d), (k, 2 n). best: v = best (x, d) without limits.
-    ahead: f gains ahead times the shifts of the reference at each tick, (k, horizon n).
+    ahead: Matrix (k, horizon n); `ahead` times the shifts of the reference at each tick is added to f.
     """
 
     cost: np.ndarray
@@ -57,21 +57,21 @@ class LinearMPC(ControlLaw):
     """Linear model predictive control: optimal inputs over a horizon, within limits (Rawlings, Mayne & Diehl 2017, ch. 1).
 
     The model is x' = A x + B u + d from tick to tick. At each tick the inputs of the next `horizon` periods minimise the
-    sum of (x - x_s)^T Q (x - x_s) + (u - u_s)^T R (u - u_s), plus (x - x_s)^T P (x - x_s) at the end. They keep |u| up to
-    `limit` and its rate up to `rate_limit`. The first of them is the demand; the next tick solves the problem anew. If the
-    unconstrained optimum keeps the limits, it is used, to round-off. Otherwise an interior-point method (Nocedal & Wright
-    2006, algorithm 16.4) solves the constrained problem: its demand is accurate to 1e-6 of the limit, in float32 to 1e-2. A
-    run reports in its messages where a tick had not converged.
+    sum of (x - x_s)^T Q (x - x_s) + (u - u_s)^T R (u - u_s), plus (x - x_s)^T P (x - x_s) at the end. The inputs satisfy
+    |u| <= `limit`, and their rates are at most `rate_limit`. The input of the first period is the demand; the next tick
+    solves a new problem. If the unconstrained optimum satisfies the limits, it is used, to round-off. Otherwise an
+    interior-point method (Nocedal & Wright 2006, algorithm 16.4) solves the constrained problem. Its demand is accurate to
+    1e-6 of the limit, in float32 to 1e-2. The run's messages report ticks at which the method had not converged.
 
-    d is the estimated disturbance: the measured x minus its prediction, filtered over `disturbance_time`. x is taken
-    against the last reference, continued by its rates. x_s and u_s are the steady state under d in which the `tracked`
-    errors are 0, so steady disturbances cause no error in these. The part of a demand that actuators did not deliver is
-    not counted as an input. `lw.linear.mpc` makes the law from a linear model.
+    d is the estimated disturbance: the measured x minus its prediction, filtered over `disturbance_time`. For the prediction,
+    the last reference is continued at its rates. x_s and u_s are the steady state under d in which the `tracked` errors are
+    0, so constant disturbances cause no error in these states. Undelivered demand does not count as an input.
+    `lw.linear.mpc` creates the law from a linear model.
 
     Args:
-        states: Names of the states (n,), errors of what is measured less what is wanted: "position[0]" to "position[2]" [m,
-            inertial axes], "rotation[0]" to "rotation[2]" (the e_R of `PosePID`), "velocity[0]" to "velocity[2]" over ground
-            [m/s], "angular_velocity[0]" to "angular_velocity[2]" [rad/s], body axes.
+        states: Names of the states (n,), measured minus wanted values: "position[0]" to "position[2]" [m, inertial axes],
+            "rotation[0]" to "rotation[2]" (the e_R of `PosePID`), "velocity[0]" to "velocity[2]" over ground [m/s] and
+            "angular_velocity[0]" to "angular_velocity[2]" [rad/s], body axes.
         inputs: Names of the inputs (m,), among "X", "Y", "Z", "K", "M", "N".
         A: State matrix of one period, (n, n).
         B: Input matrix of one period, for held inputs, (n, m).
@@ -79,25 +79,25 @@ class LinearMPC(ControlLaw):
         R: Weights of the inputs (m,), above 0.
         limit: Largest inputs (m,) [N, N m].
         P: Weight of the state at the end of the horizon (n, n), symmetric; by default Q.
-        rate_limit: Largest rates of the inputs (m,) [N/s, N m/s]; by default none.
-        disturbance_time: Time over which the disturbance is filtered [s]; infinite: none is estimated. 5 by default.
-        tracked: Names of the states whose steady errors shall be 0, at most as many as inputs; by default the first of
+        rate_limit: Largest rates of the inputs (m,) [N/s, N m/s]; by default no limit.
+        disturbance_time: Time constant of the disturbance filter [s]; with inf, no disturbance is estimated. 5 by default.
+        tracked: Names of the states whose steady errors are to be 0, at most as many as inputs; by default the first of
             `states`, as many as inputs.
         lower: Least inputs (m,) [N, N m], below `limit`; by default -limit.
         outputs: Combinations C of the states (p, n) that have a limit, C x <= output_limit at each tick of the horizon; by
             default none. For a lower limit give -C.
-        output_limit: Largest outputs (p,), each in the unit of its line of C x.
-        excess_cost: Cost of a unit of an output beyond its limit, at each tick (p,), above 0. If the cost is high enough, a
-            limit that can be kept is kept; a limit that no inputs can keep is exceeded.
-        preview: Whether to use the future reference over the horizon, for which guidance must be set-points and
+        output_limit: Largest outputs (p,), each in the unit of its row of C x.
+        excess_cost: Cost of one unit of an output beyond its limit, at each tick (p,), above 0. With a sufficiently high
+            cost, a limit is exceeded only if no inputs can satisfy it.
+        preview: Whether to use the future reference over the horizon, which requires that guidance has only set-points and
             trajectories; False by default: the reference continues at its present velocity.
-        horizon: Number of periods, 1 to 100, over which the model grows at most 1e4 times; 10 by default.
-        iterations: Largest number of iterations at a tick, 50 by default; most ticks take about ten.
-        period: Period of the model [s]; a controller of another period is refused. By default any period is accepted.
+        horizon: Number of periods, 1 to 100, over which the model grows by a factor of at most 1e4; 10 by default.
+        iterations: Largest number of iterations at a tick, 50 by default; most ticks need about ten.
+        period: Period of the model [s]; a controller with another period is refused. By default any period is accepted.
 
     Raises:
-        SceneError: If names, shapes or weights are at fault, or no inputs hold a steady state without tracked errors; or
-            a number is invalid (see `Term`).
+        SceneError: If names, shapes or weights are invalid, no inputs hold a steady state without tracked errors, or a number
+            is invalid (see `Term`).
 
     Examples:
         >>> import lgvi_warp as lw
@@ -210,15 +210,15 @@ class LinearMPC(ControlLaw):
         return super().to_dict() | lists | ({} if self.tracked is None else {"tracked": list(self.tracked)})
 
     def condensed(self, numbers: Numbers, i: int, period: float) -> Condensed:
-        """The problem of a member in its inputs alone.
+        """The condensed problem of one member, in its inputs only.
 
         Args:
             numbers: Numbers of the fields by name, each (n, ...).
-            i: Place of the member in them.
+            i: Index of the member in these numbers.
             period: Time between two ticks [s].
 
         Returns:
-            Its matrices.
+            The matrices of the problem.
         """
         values = {name: value[min(i, len(value) - 1)] for name, value in numbers.items()}
         A, B, limit, N = values["A"], values["B"] * values["limit"], values["limit"], self.horizon
@@ -243,7 +243,7 @@ class LinearMPC(ControlLaw):
 
     @property
     def limits_more(self) -> bool:
-        """Whether inputs have unequal limits, outputs any, or the law looks ahead."""
+        """Whether inputs have asymmetric limits, outputs have limits, or the law uses the future reference."""
         return self.lower is not None or self.outputs is not None or self.preview
 
     @property
@@ -257,10 +257,10 @@ class LinearMPC(ControlLaw):
         return f"{DEVICE}.limited_mpc:{f'preview{self.horizon}' if self.preview else ''}"
 
     def output_rows(self, values: Numbers) -> tuple[np.ndarray, np.ndarray]:
-        """Rows of the limits of outputs of a member, tick by tick (horizon p, 2 + 2 n + k), and the outputs' lines (p, n).
+        """Rows of a member's output limits, tick by tick (horizon p, 2 + 2 n + k), and the outputs' rows of C (p, n).
 
-        Each row is the limit, the cost of a unit beyond it, what state and disturbance make of the output, and what inputs do;
-        all are in units of the largest effect of an input as a part of its limit.
+        A row has the limit, the cost of a unit beyond it, the effect of state and disturbance, and the effect of the inputs.
+        All are scaled by the largest effect of an input at its limit.
         """
         A, B, N, p = values["A"], values["B"] * values["limit"], self.horizon, len(values.get("outputs", ()))
         n, m = B.shape
@@ -314,18 +314,18 @@ class LinearMPC(ControlLaw):
 
 
 def _at_least_zero(matrix: np.ndarray) -> bool:
-    """Whether a matrix is symmetric and has no negative eigenvalue, but for round-off."""
+    """Whether a matrix is symmetric and positive semidefinite, up to round-off."""
     size = np.abs(matrix).max()
     return bool(np.allclose(matrix, matrix.T) and np.linalg.eigvalsh(matrix).min() >= -1e-9 * size)
 
 
 def _growth_rate(A: np.ndarray) -> np.ndarray:
-    """By how much states of models (..., n, n) grow in a period at most in the long run, at least 1."""
+    """Growth factor per period of states of models (..., n, n) in the long run, at least 1."""
     return np.asarray(np.maximum(np.abs(np.linalg.eigvals(A)).max(axis=-1), 1.0))
 
 
 def _steady_state(A: np.ndarray, B: np.ndarray, tracked: Sequence[int]) -> np.ndarray | None:
-    """(x_s, u_s) = S d, (n + m, n): the smallest with x_s = A x_s + B u_s + d and no error of what is tracked; None: none."""
+    """S (n + m, n) of the smallest (x_s, u_s) = S d with x_s = A x_s + B u_s + d and zero tracked errors, or None."""
     n, m = B.shape
     goal = np.eye(n)[list(tracked)]
     both = np.block([[A - np.eye(n), B], [goal, np.zeros((len(goal), m))]])

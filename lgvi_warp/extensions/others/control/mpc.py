@@ -34,34 +34,34 @@ def mpc(
     preview: bool = False,
     name: str = "",
 ) -> LinearMPC:
-    """Design model predictive control of a linear model; the terminal cost is that of its linear quadratic regulator.
+    """Design model predictive control of a linear model, with the terminal cost of its linear quadratic regulator.
 
-    While no limit is active, the law equals the linear quadratic regulator, whatever the horizon.
+    While no limit is active, the law equals the linear quadratic regulator for any horizon.
 
     Args:
-        model: The linear model, of `lw.linear.linearize(scene, inputs="wrench", period=...)`, of some of its states by
-            `.part(...)`. Its period is that of the controller. Velocities are those over ground, in a set-point's reference.
+        model: Linear model from `lw.linear.linearize(scene, inputs="wrench", period=...)`, reduced to some states and inputs
+            by `.part(...)`. Its period must be that of the controller. Velocities are over ground, as for a set-point.
         Q: Weights of the states (n,), at least 0.
         R: Weights of the inputs (m,), above 0.
         limit: Largest inputs (m,) [N, N m].
-        rate_limit: Largest rates of the inputs (m,) [N/s, N m/s]; by default none.
+        rate_limit: Largest rates of the inputs (m,) [N/s, N m/s]; by default no limit.
         horizon: Number of periods, 1 to 100; 10 by default.
         iterations: Largest number of iterations at a tick; 50 by default.
-        disturbance_time: Time over which the disturbance is filtered [s]; infinite: none is estimated. 5 by default.
-        tracked: Names of the states whose steady errors shall be 0; by default the first, as many as inputs.
+        disturbance_time: Time constant of the disturbance filter [s]; with inf, no disturbance is estimated. 5 by default.
+        tracked: Names of the states whose steady errors are to be 0; by default the first, as many as inputs.
         lower: Least inputs (m,) [N, N m]; by default -limit.
         outputs: Combinations of the states (p, n) that have a limit, C x <= output_limit; by default none.
         output_limit: Largest outputs (p,).
-        excess_cost: Cost of a unit of an output beyond its limit, at each tick (p,), above 0.
+        excess_cost: Cost of one unit of an output beyond its limit, at each tick (p,), above 0.
         preview: Whether to use the future reference of set-points and trajectories; False by default.
         name: Name of the part; by default its type.
 
     Returns:
-        The law.
+        The control law.
 
     Raises:
-        SceneError: If inputs are no components of a wrench, or states no coordinates of the motion; if a weight is at fault,
-            or no gains hold every state.
+        SceneError: If inputs are not components of a wrench, states are not coordinates of the motion, a weight is invalid,
+            or no gains stabilise every state.
 
     Examples:
         >>> import lgvi_warp as lw

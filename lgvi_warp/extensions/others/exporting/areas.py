@@ -22,14 +22,14 @@ ON_LIMIT = 1e-12
 
 
 def areas(footprint: Footprint, plane: LocalPlane) -> Iterator[tuple[Region, list[Rings]]]:
-    """Give the regions with their polygons, the largest first, so that no region hides a smaller one."""
+    """Yield the regions with their polygons, the largest first, so that no region hides a smaller one."""
     for region in sorted(footprint.regions, key=lambda region: -region.share):
         polygons = [_on_map(polygon, plane) for polygon in region.polygons]
         yield region, [part for rings in polygons for part in divided(rings)]
 
 
 def _on_map(polygon: tuple[np.ndarray, ...], plane: LocalPlane) -> Rings:
-    """Convert the rings of a polygon; longitudes go on beyond 180 degrees where the polygon does."""
+    """Convert the rings of a polygon to longitude and latitude; longitudes exceed 180 degrees if the polygon does."""
     rings: Rings = []
     for ring in polygon:
         latitude, longitude = plane.geodetic(ring[:, 0], ring[:, 1])
@@ -56,8 +56,8 @@ def divided(rings: Rings) -> list[Rings]:
 def _beyond(polygon: Rings, limit: float, sign: float) -> list[Rings]:
     """Keep the parts of a polygon where sign * (longitude - limit) is positive.
 
-    Along the limit, going north or south, its rings by turns enter this half and leave it. So the end of each chain of kept
-    points is joined to the start of the same rank, and holes that reach the limit become a part of the outer rings.
+    Along the limit, going north or south, the rings alternately enter this half and leave it. So the end of each chain of
+    kept points is joined to the start of the same rank, and holes that reach the limit become part of the outer rings.
     """
     chains: list[np.ndarray] = []
     whole: Rings = []
@@ -91,7 +91,7 @@ def _beyond(polygon: Rings, limit: float, sign: float) -> list[Rings]:
 
 
 def _holds(ring: np.ndarray, place: np.ndarray) -> bool:
-    """Tell whether a place is within a ring: a ray to the east crosses it an odd number of times."""
+    """Whether a point is within a ring: a ray to the east crosses the ring an odd number of times."""
     a, b = ring[:-1], ring[1:]
     across = (a[:, 1] > place[1]) != (b[:, 1] > place[1])
     a, b = a[across], b[across]

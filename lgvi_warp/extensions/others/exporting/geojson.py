@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tracks of members, or regions of a footprint, as a GeoJSON file (RFC 7946): a feature for each.
+"""Tracks of members, or regions of a footprint, as a GeoJSON file (RFC 7946) with one feature for each.
 
-A track has the outcome of its member and the times of its points, a region its share and its area.
+A track has its member's outcome and the times of its points. A region has its probability and its area.
 """
 
 from __future__ import annotations
@@ -40,14 +40,14 @@ def write(tracks: Tracks, target: Path, report: Report) -> None:
 
 
 def _feature(line: MapLine) -> dict[str, Any]:
-    """A member: its line, and when it was where."""
+    """The feature of a member: its line, and the times of its points."""
     geometry, times = _geometry(line)
     properties = {"member": line.member, "status": line.status, "end_time": line.end_time, "times": times}
     return {"type": "Feature", "id": line.member, "geometry": geometry, "properties": properties}
 
 
 def _geometry(line: MapLine) -> tuple[dict[str, Any] | None, Any]:
-    """The geometry of a line, and its times [s] in the same lists: None for no place, a point for one."""
+    """The geometry of a line, and its times [s] in the same lists; None without points, a point for one."""
     if len(line.points) == 0:
         return None, []
     if len(line.points) == 1:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tracks of members as a KML file: tracks in time where the run has a date, else lines; or regions of a footprint."""
+"""Tracks of members as a KML file, with times if the run has a date, else as lines; or regions of a footprint."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def write(tracks: Tracks, target: Path, report: Report) -> None:
 
 
 def _placemark(tracks: Tracks, line: MapLine) -> ET.Element:
-    """A member: its name, its outcome, and its track or line."""
+    """The placemark of a member: its name, its outcome, and its track or line."""
     placemark = ET.Element("Placemark")
     _text(placemark, "name", f"member {line.member}")
     data = ET.SubElement(placemark, "ExtendedData")
@@ -61,7 +61,7 @@ def _placemark(tracks: Tracks, line: MapLine) -> ET.Element:
 
 
 def _track(tracks: Tracks, track: ET.Element, line: MapLine) -> None:
-    """Add times, then places: a viewer goes the short way between two, across the antimeridian too."""
+    """Add times, then positions; a viewer joins two positions the short way, also across the antimeridian."""
     _text(track, "altitudeMode", "absolute")
     for moment in np.datetime_as_string(tracks.moments(line.points[:, 3])):
         _text(track, "when", f"{moment}Z")
@@ -76,7 +76,7 @@ def _coordinates(geometry: ET.Element, points: np.ndarray) -> None:
 
 
 def _places(geometry: ET.Element, points: np.ndarray) -> None:
-    """Add longitude and latitude, and height where they have one, of points."""
+    """Add longitude, latitude and, if given, height of points."""
     _text(geometry, "coordinates", " ".join(",".join(map(repr, point)) for point in points.tolist()))
 
 

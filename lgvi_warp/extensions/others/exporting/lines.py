@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tracks as lines on a map: places and times of each member until it ended, cut where they cross the antimeridian."""
+"""Tracks as lines on a map: positions and times of each member until its end, cut at the antimeridian."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from lgvi_warp.store.exporting.tracks import Tracks
 
 @dataclass(frozen=True, eq=False)
 class MapLine:
-    """A member's places.
+    """The track of a member.
 
-    member: Index in its ensemble. status: outcome in a word. end_time: when it ended [s].
-    points: Longitude, latitude [deg], height [m] and time [s], (p, 4); without places that are not finite.
+    member: Index in its ensemble. status: Outcome as a word. end_time: Time at which the member ended [s].
+    points: Longitude, latitude [deg], height [m] and time [s], (p, 4); points that are not finite are left out.
     """
 
     member: int
@@ -31,7 +31,7 @@ class MapLine:
 
 
 def lines(tracks: Tracks, purpose: str) -> Iterator[MapLine]:
-    """Read the lines of the members, some at a time."""
+    """Read the lines of the members, in groups of members."""
     tracks.needing(("position",), purpose)
     plane = tracks.needing_origin(purpose)
     statuses, ends = tracks.statuses(), tracks.of_members("end_time")
@@ -46,7 +46,7 @@ def lines(tracks: Tracks, purpose: str) -> Iterator[MapLine]:
 
 
 def cut(points: np.ndarray) -> list[np.ndarray]:
-    """Divide points (p, 4) where two of them are on either side of the antimeridian; both parts end on it.
+    """Divide points (p, 4) at crossings of the antimeridian; the parts on both sides end on it.
 
     Latitude, height and time are interpolated by longitude (RFC 7946, 3.1.9).
     """

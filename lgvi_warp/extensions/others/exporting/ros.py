@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Members of a run as messages of ROS 2 in an MCAP file: odometry of each, and transforms of all.
 
-Axes are those of REP 103 and REP 105: the frame "map" points east, north and up; "member_3/base_link" ahead, to port and up.
+Axes follow REP 103 and REP 105: the frame "map" points east, north and up; "member_3/base_link" forward, to port and up.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ MOST_MEMBERS = 1000
 
 
 def _definition(main: str, parts: Mapping[str, str]) -> str:
-    """The definition of a message with those of its parts, as bags of ROS 2 have it."""
+    """The definition of a message followed by those of its parts, in the format of ROS 2 bags."""
     return main + "".join(f"{_SEPARATOR}\nMSG: {name}\n{text}" for name, text in parts.items())
 
 
@@ -67,7 +67,7 @@ UNKNOWN = [0.0] * 36
 
 
 class State(NamedTuple):
-    """States of members at one time, in the axes of ROS: places of the members (m,), and numbers (m, 3 or 4)."""
+    """States of members at one time, in the axes of ROS: positions of the members in the run (m,), and numbers."""
 
     time: float
     at: np.ndarray
@@ -113,7 +113,7 @@ def _named(values: np.ndarray, names: str = "xyz") -> dict[str, float]:
 
 
 def _about(tracks: Tracks) -> dict[str, str]:
-    """Metadata that messages cannot hold: origin and start of the axes, and how each member ended."""
+    """Metadata that messages cannot hold: origin of the axes, start time, and the outcome of each member."""
     environment = tracks.environment
     about = {"source": tracks.source, "axes": "map: east, north, up; base_link: ahead, port, up"}
     about |= {} if environment.origin is None else {"origin": " ".join(map(repr, environment.origin))}
@@ -123,7 +123,7 @@ def _about(tracks: Tracks) -> dict[str, str]:
 
 
 def _states(tracks: Tracks) -> Iterator[State]:
-    """The states in the order of their times: of all members under way at the samples, of each at its end."""
+    """States in the order of their times: of all members under way at each sample, and of each member at its end."""
     ends, time = tracks.of_members("end_time"), tracks.time
     end_stamps, stamps = tracks.moments(ends), tracks.moments(time)
     for when in tracks.spans(30):
@@ -140,7 +140,7 @@ def _states(tracks: Tracks) -> Iterator[State]:
 
 
 def _state(samples: Mapping[str, np.ndarray], k: int, time: float, chosen: np.ndarray) -> Iterator[State]:
-    """The state of some members at a sample, without those that have none; nothing where no member has one."""
+    """The state of some members at a sample, without members that have no state there; empty if no member has one."""
     whole = [np.isfinite(samples[name][k].reshape(len(chosen), -1)).all(axis=1) for name in FIELDS]
     at = np.flatnonzero(np.logical_and.reduce([chosen, *whole]))
     if len(at):

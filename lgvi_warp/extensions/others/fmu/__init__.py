@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A vehicle as a unit of the FMI standard: its variables, its steps, and the file that holds both."""
+"""A vehicle as a co-simulation unit (FMU) of the FMI standard: its variables, its steps, and its file."""

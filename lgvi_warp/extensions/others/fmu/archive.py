@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A scene as an FMU: a co-simulation unit of FMI 2.0 that PythonFMU's wrapper runs in the Python that has lgvi_warp.
+"""A scene as an FMU: a co-simulation unit of FMI 2.0, run by PythonFMU's wrapper in the Python with lgvi_warp installed.
 
-Of PythonFMU are the wrapper's libraries and its base class. Its builder is not used: it runs the script that it packs, leaves
-a folder on the path, and stamps the file with the time and the machine. The same scene gives the same bytes.
+PythonFMU provides the wrapper's libraries and base class. Its builder is not used, because it runs the packed script, leaves
+a folder on the path, and writes time and machine into the file. Here the same scene always gives the same bytes.
 """
 
 from __future__ import annotations
@@ -67,12 +67,12 @@ OF_FILES = ("file", "mesh")
 
 
 def scene_writer(scene: Scene, inputs: str) -> Any:
-    """Check that a unit can be made of a scene, and return the function (target, report) that writes it.
+    """Check that a scene can become a unit, and return the function (target, report) that writes the unit.
 
-    inputs: as in `VehicleUnit`.
+    inputs: As in `VehicleUnit`.
 
     Raises:
-        SceneError: If it cannot; the message lists every fault.
+        SceneError: If the scene cannot become a unit; the message lists every fault.
     """
     files = dict(_of_wrapper())
     content = _content(scene, inputs)
@@ -96,7 +96,7 @@ def scene_writer(scene: Scene, inputs: str) -> Any:
 
 
 def _of_wrapper() -> Iterator[tuple[str, bytes]]:
-    """Files of PythonFMU in a unit."""
+    """Files of PythonFMU that a unit contains."""
     try:
         import pythonfmu
     except ImportError as error:
@@ -110,7 +110,7 @@ def _of_wrapper() -> Iterator[tuple[str, bytes]]:
 
 
 def _content(scene: Scene, inputs: str) -> dict[str, Any]:
-    """What the class reads: a scene that is whole, with its step and method. Raises SceneError."""
+    """The scene's content, with its step and method, for the unit's class. Raises SceneError if it is incomplete."""
     faults = Faults()
     faults.choice("inputs", inputs, INPUTS)
     if scene.run.step is None:
@@ -143,7 +143,7 @@ def _content(scene: Scene, inputs: str) -> dict[str, Any]:
 
 
 def _files(part: Any, where: str = "") -> Iterator[tuple[str, str]]:
-    """Keys of a scene's tables that name files, and the names; what varies is not carried."""
+    """Keys of a scene's tables that name files, with the names; settings of the ensemble are left out."""
     entries = part.items() if isinstance(part, Mapping) else enumerate(part) if isinstance(part, list) else ()
     for key, value in entries:
         place = f"{where}[{key}]" if isinstance(key, int) else f"{where}.{key}".lstrip(".")

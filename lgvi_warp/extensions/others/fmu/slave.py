@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The side of a unit that PythonFMU's wrapper calls; the class in the unit's own file adds PythonFMU's base class."""
+"""The methods of a unit that PythonFMU's wrapper calls; the class in the unit's own file adds PythonFMU's base class."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ CONTENT = "vehicle.json"
 
 
 class UnitOfVehicle:
-    """A vehicle of the file's scene. Value references are places in its list of variables."""
+    """A vehicle of the file's scene. Value references are indices in its list of variables."""
 
     # Of PythonFMU's base class.
     log: Any
@@ -35,16 +35,16 @@ class UnitOfVehicle:
             )
 
     def setup_experiment(self, start_time: float, *others: Any) -> None:
-        """Begin at t = 0."""
+        """Begin the experiment at t = 0."""
         if start_time != 0.0:
             raise ValueError(f"start time {start_time:.9g} s: a vehicle begins at 0. Give 0, and [start] in the scene")
 
     def exit_initialization_mode(self) -> None:
-        """Load the kernel, compiled first if Warp's cache has none."""
+        """Load the kernel, and compile it first if Warp's cache does not have it."""
         self.unit.begin()
 
     def do_step(self, current_time: float, step_size: float) -> bool:
-        """Make a communication step; False for one that cannot be made, of which the log says why."""
+        """Do a communication step; returns False if it fails, with the reason in the log."""
         from pythonfmu.enums import Fmi2Status
 
         try:
@@ -63,12 +63,12 @@ class UnitOfVehicle:
         return [int(self.unit.get(self.names[place])) for place in places]
 
     def set_real(self, places: Sequence[int], values: Sequence[float]) -> None:
-        """Give inputs and parameters."""
+        """Set inputs and parameters."""
         for place, value in zip(places, values, strict=True):
             self.unit.set(self.names[place], float(value))
 
     def set_integer(self, places: Sequence[int], values: Sequence[int]) -> None:
-        """Give the seed."""
+        """Set the seed."""
         for place, value in zip(places, values, strict=True):
             self.unit.set(self.names[place], int(value))
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Variables of a vehicle as a unit of the FMI standard, and how it takes and gives their values."""
+"""A vehicle as a unit of the FMI standard: its variables, and reading and setting their values."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ EULER = Field("euler", (3,), "rad", "roll, pitch and yaw, R = Rz(yaw) Ry(pitch) 
 
 @dataclass(frozen=True)
 class Variable:
-    """A single number of a unit: causality "input", "parameter" or "output"; start: None of outputs."""
+    """A single number of a unit. causality: "input", "parameter" or "output". start: Start value; None for outputs."""
 
     name: str
     causality: str
@@ -49,18 +49,18 @@ class Variable:
 
     @property
     def whole(self) -> bool:
-        """Whether it is a whole number."""
+        """Whether the variable is a whole number."""
         return self.name in (SEED, STATUS)
 
 
 class VehicleUnit:
-    """One vehicle with its actuators, sensors, and controller where that stays inside.
+    """One vehicle with its actuators, its sensors and, unless commands are inputs, its controller.
 
-    scene: with a [run] step and method. inputs: "commands" of all terms that take them, in place of laws, guidance and
-    allocation; or "set_points" of the guidance. variables: in the order of their value references.
+    scene: A scene with a [run] step and method. inputs: "commands" of all terms that take them, instead of laws, guidance
+    and allocation; or "set_points" of the guidance. variables: In the order of their value references.
 
     Raises:
-        SceneError: If the scene is none that a unit can be made of.
+        SceneError: If the scene cannot become a unit.
     """
 
     def __init__(self, scene: Scene, inputs: str):
@@ -82,7 +82,7 @@ class VehicleUnit:
         self._late: str | None = None
 
     def _acted(self, scene: Scene) -> Scene:
-        """The scene on which the inputs act."""
+        """The scene with a callback that applies the inputs."""
         if not self._terms:
             return scene
         own = {term.key: term for term in self._terms}
@@ -136,7 +136,7 @@ class VehicleUnit:
         return 0.0 if self._vehicle is None else self._vehicle.steps * self._vehicle.h
 
     def get(self, name: str) -> float | int:
-        """The value of a variable now."""
+        """The present value of a variable."""
         if name in self._values:
             return self._values[name]
         if self._shown is None:
@@ -144,7 +144,7 @@ class VehicleUnit:
         return self._shown[name]
 
     def set(self, name: str, value: float | int) -> None:
-        """Give a parameter, before the first step, or an input. A later parameter lets the next step fail."""
+        """Set an input, or a parameter before the first step. If a parameter is set later, the next step fails."""
         if value == self._values[name]:
             return
         fixed = name not in self._inputs
@@ -159,7 +159,7 @@ class VehicleUnit:
             self._vehicle = self._shown = None
 
     def begin(self) -> SteppedVehicle:
-        """The vehicle; at its start where a number of it was given since."""
+        """The vehicle; a new one at its start if one of its numbers was set since."""
         if self._vehicle is None:
             chosen = self._changed - {SEED}
             if not self.of_commands:
@@ -170,7 +170,7 @@ class VehicleUnit:
         return self._vehicle
 
     def _set_points(self) -> dict[str, Any]:
-        """Numbers of set-points by name, as they are given now."""
+        """The present numbers of set-points, by name."""
         numbers: dict[str, Any] = {}
         for part in self._guidance:
             for name, value in part.parameters().items():
@@ -179,7 +179,7 @@ class VehicleUnit:
         return numbers
 
     def step(self, time: float, length: float) -> None:
-        """Move from a time on [s] for a length of time [s], a whole number of steps.
+        """Advance from a time [s] by a length of time [s], a whole number of steps.
 
         Raises:
             ValueError: If time and length do not fit, or the vehicle fails.
@@ -217,11 +217,11 @@ class VehicleUnit:
         return shown
 
     def remembered(self) -> dict[str, Any]:
-        """What the unit is now, as JSON can hold it."""
+        """The present state of the unit, as JSON values."""
         return {"values": dict(self._values), "changed": sorted(self._changed), "vehicle": self.begin().remembered()}
 
     def recall(self, state: Mapping[str, Any]) -> None:
-        """Be again what the unit was; also another instance of it."""
+        """Restore a state of this unit or of another instance of it."""
         if state["values"].keys() != self._values.keys():
             raise ValueError("the state is that of another unit: give one of this")
         if {n: state["values"][n] for n in state["changed"]} != {n: self._values[n] for n in self._changed}:
@@ -232,12 +232,12 @@ class VehicleUnit:
 
 
 def _held(scene: Scene, term: Any) -> bool:
-    """Whether the commands of a term are inputs: a schedule of its own goes on."""
+    """Whether the commands of a term are inputs; a term with its own schedule keeps the schedule."""
     return (scene.controller is not None and term.key in scene.controller.actuators) or getattr(term, "holds", True)
 
 
 def _free(term: Any) -> Any:
-    """The term without commands of its own."""
+    """The term with its own commands set to 0."""
     return term.with_fields({"command": np.zeros(term.channels)}) if isinstance(term, Commanded) else term
 
 
@@ -252,7 +252,7 @@ def _set_points(scene: Scene) -> list[SetPoint]:
 
 
 def _entries(name: str, value: Any) -> Iterator[tuple[str, float]]:
-    """The single numbers of a number of the scene, by name; of a symmetric matrix those on and above the diagonal."""
+    """(name, value) of each entry of a number of the scene; of a symmetric matrix, entries on and above the diagonal."""
     array = np.asarray(value, dtype=np.float64)
     for index in np.ndindex(*array.shape):
         if name not in MATRICES or index[0] <= index[1]:
@@ -260,10 +260,10 @@ def _entries(name: str, value: Any) -> Iterator[tuple[str, float]]:
 
 
 def _unfit(value: np.ndarray) -> bool:
-    """Whether a number is no variable: one of too many entries, or not finite."""
+    """Whether a number cannot be a variable: it has too many entries, or is not finite."""
     return value.size > MOST_ENTRIES or value.dtype.kind not in "fiu" or not np.all(np.isfinite(value))
 
 
 def _nothing(t: float, y: Any, r: Any, members: Any) -> Any:
-    """Stands for the caller, who answers each tick himself."""
+    """Placeholder of the callback; the caller of the unit sets the answer of each tick."""
     raise AssertionError

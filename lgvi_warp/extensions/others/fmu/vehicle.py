@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One vehicle that is stepped from outside: as many steps at a time as the caller wants, with the bits of a run."""
+"""One vehicle that a caller advances by any number of steps at a time, with results bit-identical to a run."""
 
 from __future__ import annotations
 
@@ -29,26 +29,26 @@ NEVER = 2**31 - 1
 
 
 class EachLaunch(Launches):
-    """Launches each of which ends with a sample, whatever the steps that it makes."""
+    """Launches that each end with a sample, for any number of steps."""
 
     @functools.cached_property
     def times(self) -> tuple[Any, Any, Any]:
-        """The same as in `Launches`, with the step of the launch in hand as the only one of a sample."""
+        """Times as in `Launches`, but with the present launch's step as the only step with a sample."""
         stages, leads, _ = super().times
         return stages, leads, wp.array(np.array([NEVER, NEVER], np.int32), dtype=wp.int32, device="cpu")
 
     def samples_due(self, k0: int, k1: int) -> tuple[int, int]:
-        """Let a sample be due after step k1."""
+        """Make a sample due after step k1."""
         self.times[2].numpy()[0] = k1
         return 0, int(k1 > k0)
 
 
 class SteppedVehicle:
-    """The first member of a scene, from its start on.
+    """The first member of a scene, advanced from its start.
 
-    scene: with a [run] step. seed: of its noise. signals: names of those that are wanted. changing: names of numbers of the
-    scene that may change while it moves. steps: made so far. values: motion and signals by name now. status: as of
-    `lw.Status`; a vehicle that ended keeps its last state and signals.
+    scene: A scene with a [run] step. seed: Seed of its noise. signals: Names of requested signals. changing: Names of numbers
+    of the scene that may change during the motion. steps: Number of steps done. values: Present motion and signals by name.
+    status: A code of `lw.Status`; an ended vehicle keeps its last state and signals.
     """
 
     def __init__(self, scene: Any, seed: int, signals: tuple[str, ...], changing: tuple[str, ...] = ()):
@@ -71,14 +71,14 @@ class SteppedVehicle:
         self.values = self._first()
 
     def _rows(self, signals: tuple[str, ...]) -> dict[str, range]:
-        """The rows of the memory in which ticks note signals, by name."""
+        """The rows of the memory in which ticks record signals, by name."""
         layout, controller = self.plan.layout, self.plan.kernel_choice.controller
         firsts = {name: rows.start for name, rows in layout.noted_rows.items()}
         begins = {name: row_of(name, controller.bus, firsts) for name in signals} if controller is not None else {}
         return {name: range(row, row + math.prod(layout.table[name].shape)) for name, row in begins.items()}
 
     def _read(self) -> dict[str, np.ndarray]:
-        """The signals that the last tick noted."""
+        """The signals that the last tick recorded."""
         rows, table = self._packets.laws.memory.view[0, :, 0], self.plan.layout.table
         noted = {
             name: rows[place.start : place.stop].astype(np.float64).reshape(table[name].shape)
@@ -102,7 +102,7 @@ class SteppedVehicle:
         return {name: value[0, 0] for name, value in values.items()} | self._read()
 
     def change(self, numbers: Mapping[str, float | np.ndarray]) -> None:
-        """Let parts of the controller have other numbers from now on; they act from the next tick on."""
+        """Set numbers of parts of the controller; they take effect at the next tick."""
         parameters = {name: np.asarray(value, dtype=np.float64)[None] for name, value in numbers.items()}
         self._members = replace(self._members, parameters={**self._members.parameters, **parameters})
         if self._aside is None:
@@ -111,7 +111,7 @@ class SteppedVehicle:
         self._packets.laws.structs[1].view[...] = self._aside.laws.structs[1].view
 
     def advance(self, steps: int, commands: np.ndarray) -> None:
-        """Make so many steps under commands (channels,), which ticks see; without channels where a controller acts."""
+        """Advance by `steps` steps with commands (channels,), read at ticks; without channels if a controller acts."""
         last, launches, raw = self.steps + steps, self.plan.launches, np.empty(0)
         with np.errstate(invalid="ignore", over="ignore"):
             while self.steps < last:
@@ -130,18 +130,18 @@ class SteppedVehicle:
         self.values = {name: values[name][0, 0] for name in self.plan.fields} | signals
 
     def _lanes(self) -> list[np.ndarray]:
-        """All that the kernel remembers from launch to launch."""
+        """All arrays that the kernel keeps from launch to launch."""
         packets = self._packets
         return [packets.laws.memory.view, packets.state_lanes.view, *packets.noted.values()]
 
     def remembered(self) -> dict[str, Any]:
-        """What the vehicle is now, as numbers that JSON can hold."""
+        """The present state of the vehicle, as JSON values."""
         lanes = [view.ravel().tolist() for view in self._lanes()]
         values = {name: value.tolist() for name, value in self.values.items()}
         return {"steps": self.steps, "status": self.status, "lanes": lanes, "values": values}
 
     def recall(self, state: Mapping[str, Any]) -> None:
-        """Be again what the vehicle was."""
+        """Restore a state of the vehicle."""
         lanes = self._lanes()
         if [len(given) for given in state["lanes"]] != [view.size for view in lanes]:
             raise ValueError("the state is that of another vehicle: give one of this unit")

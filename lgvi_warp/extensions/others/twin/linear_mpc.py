@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Linear model predictive control: a problem of all inputs of a horizon, by an interior-point method."""
+"""Linear model predictive control: a quadratic program in all inputs of a horizon, by an interior-point method."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -14,7 +14,7 @@ COMPONENTS = "XYZKMN"
 
 
 class LinearMPC(Part):
-    """Numbers as those of `lw.control.LinearMPC`."""
+    """Numbers of `lw.control.LinearMPC`."""
 
     P = rate_limit = tracked = lower = outputs = output_limit = excess_cost = None
     preview = False
@@ -23,33 +23,33 @@ class LinearMPC(Part):
     disturbance_time, horizon, iterations = 5.0, 10, 50
 
     def begin(self) -> None:
-        """Nothing is known of the last tick."""
+        """Begin without a previous tick."""
         n, m = np.shape(self.B)
         self.begun, self.x, self.u, self.d = False, np.zeros(n), np.zeros(m), np.zeros(n)
         self.shifts, self.wanted = None, NO_WISH
 
     @property
     def ahead(self) -> int:  # type: ignore[override]
-        """The horizon, with preview."""
+        """The number of future references needed: the horizon with preview, else 0."""
         return self.horizon if self.preview else 0
 
     def errors(self, r: Reference, y: Measurement) -> Array:
-        """The states: what is measured less what is wanted."""
+        """The states: measured minus wanted values."""
         position, rotation, velocity, rate = pose_errors(r, y)
         errors = np.concatenate([-position, rotation, -velocity, -rate])
         return errors[[COORDINATES.index(name) for name in self.states]]
 
     def errors_later(self, r: Reference, y: Measurement, time: float) -> Array:
-        """The same where the reference went on at its rates for a time."""
+        """The states if the reference had continued at its rates for a time."""
         going = np.concatenate([r.velocity, y.R.T @ r.R @ r.angular_velocity, np.zeros(6)])
         return self.errors(r, y) - time * going[[COORDINATES.index(name) for name in self.states]]
 
     def foresee(self, later: Sequence[Reference], r: Reference, y: Measurement) -> None:
-        """Keep how the errors of later references differ from those of r as it goes on at its rates."""
+        """Store the differences between errors for future references and for r continued at its rates."""
         self.shifts = [self.errors(s, y) - self.errors_later(r, y, (j + 1) * y.period) for j, s in enumerate(later)]
 
     def steady_state(self, d: Array) -> tuple[Array, Array]:
-        """x_s and u_s with x_s = A x_s + B u_s + d and no error of what is tracked."""
+        """x_s and u_s with x_s = A x_s + B u_s + d and zero tracked errors."""
         A, B = np.asarray(self.A), np.asarray(self.B)
         n, m = B.shape
         tracked = self.states[:m] if self.tracked is None else self.tracked
@@ -59,7 +59,7 @@ class LinearMPC(Part):
         return found[:n], found[n:]
 
     def problem(self, x: Array, d: Array) -> tuple[Array, Array]:
-        """H and f of U H U / 2 + f U, the cost of inputs U (horizon m,) from x on, up to what does not depend on them."""
+        """H and f of U H U / 2 + f U, the cost of inputs U (horizon m,) from state x, up to a constant."""
         A, B, m = np.asarray(self.A), np.asarray(self.B), np.shape(self.B)[1]
         x_s, u_s = self.steady_state(d)
         size = self.horizon * m
@@ -77,7 +77,7 @@ class LinearMPC(Part):
         return H, f
 
     def solved(self, H: Array, f: Array, before: Array, change: Array | None) -> Array:
-        """The best inputs (horizon, m), as parts of their limits; before: the last; change: their limits."""
+        """The best inputs (horizon, m), divided by their limits; before: last inputs; change: limits of changes."""
         size, m = len(f), len(before)
         best = -np.linalg.solve(H, f)
         C, middle, half = np.eye(size), np.zeros(size), np.ones(size)
@@ -92,7 +92,7 @@ class LinearMPC(Part):
         return interior(H, f, both, ends, np.concatenate([half, half]), self.iterations).reshape(-1, m)
 
     def sides(self, x: Array, d: Array, before: Array, change: Array | None) -> tuple[Array, Array, Array]:
-        """C, room and cost of C v <= room + excess, of all inputs v as parts of their limits; infinite costs of inputs."""
+        """C, bounds and costs of C v <= bound + excess for inputs v divided by their limits; input limits cost inf."""
         limit, m, N = np.asarray(self.limit, float), len(self.limit), self.horizon
         lower = -np.ones(m) if self.lower is None else np.asarray(self.lower) / limit
         size, eye = N * m, np.eye(N * m)
@@ -122,7 +122,7 @@ class LinearMPC(Part):
         return np.concatenate(C), np.concatenate(room), np.concatenate(cost)
 
     def control(self, w: Array, r: Reference, y: Measurement, unmet: Array) -> Array:
-        """The first of the best inputs."""
+        """The demand: the first of the best inputs."""
         limit = np.asarray(self.limit, float)
         x = self.errors(r, y)
         places = [COMPONENTS.index(name) for name in self.inputs]
@@ -151,7 +151,7 @@ class LinearMPC(Part):
 
 
 def interior(H: Array, f: Array, C: Array, d: Array, slacks: Array, iterations: int) -> Array:
-    """v of least v H v / 2 + f v with C v <= d, by Mehrotra's predictor and corrector from v = 0 and these slacks on."""
+    """Minimiser v of v H v / 2 + f v with C v <= d, by Mehrotra's predictor-corrector method from v = 0 and `slacks`."""
     v, s, size = np.zeros(len(f)), slacks.copy(), max(H[0, 0], np.abs(f).max())
     multipliers = np.full(len(d), size)
     for _ in range(iterations):
@@ -173,9 +173,9 @@ def interior(H: Array, f: Array, C: Array, d: Array, slacks: Array, iterations: 
 
 
 def softened(H: Array, f: Array, C: Array, room: Array, cost: Array, iterations: int) -> Array:
-    """v of least v H v / 2 + f v + cost e with C v <= room + e, e >= 0, and e = 0 where the cost is infinite.
+    """Minimiser v of v H v / 2 + f v + cost e with C v <= room + e and e >= 0; infinite costs mean e = 0.
 
-    Mehrotra's predictor and corrector, the excess e and the multiplier of e >= 0, cost - multiplier, eliminated.
+    Mehrotra's predictor-corrector method, with the excess e and the multiplier of e >= 0, cost - multiplier, eliminated.
     """
     v = -np.linalg.solve(H, f)
     if np.all(C @ v <= room):

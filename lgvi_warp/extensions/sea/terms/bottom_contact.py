@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Contact with the sea floor: what lands, lies or slides there."""
+"""Contact with the sea floor, for vehicles that land, rest or slide on it."""
 
 from __future__ import annotations
 
@@ -28,24 +28,24 @@ LEAST = 0.08
 class BottomContact(Term):
     """Contact of hull points with a floor whose `contact` is "rest": springs, dampers and dry friction.
 
-    A point at a depth d below the floor is pushed out by stiffness * d + damping * (its speed into the floor), never
-    pulled. Along the floor a spring and a damper hold it, up to friction times that push; beyond, it slides. A vehicle at
-    rest stays at rest.
+    The floor pushes a point at the depth d below it with the force stiffness * d + damping * (speed into the floor), and
+    never pulls. Along the floor, a spring and a damper hold the point with a force of at most friction times this push;
+    beyond it, the point slides. A vehicle at rest stays at rest.
 
-    The step h limits stiffness and damping. At the limits, the fastest oscillation of the vehicle on all its points
-    advances by 1 rad in a step, and loses its speed in one step. The limits are the defaults, so a shorter step makes a
-    harder floor. At rest, a net weight W sinks in by W h^2 / m or more, with m the mass including added mass.
+    The step h limits stiffness and damping. At these limits, the phase of the vehicle's fastest oscillation on all its
+    points advances by 1 rad in a step, and its speed decays within one step. The limits are the defaults, so a shorter step
+    makes a harder floor. At rest, a net weight W sinks in by W h^2 / m or more, where m is the mass including added mass.
 
     Args:
         points: Points of the hull that may touch the floor, (k, 3) [m] from the body's origin.
-        friction: Friction over push, the tangent of the angle of the cone; 0.5 by default.
-        stiffness: Stiffness of the floor at each point [N/m]; by default as the step allows.
-        damping: Damping at each point [N s/m]; by default as the step allows, at least so much that no bounce gains energy.
+        friction: Coefficient of friction, the tangent of the friction cone's angle; 0.5 by default.
+        stiffness: Stiffness of the floor at each point [N/m]; by default the limit for the step.
+        damping: Damping at each point [N s/m]; by default the limit for the step, but enough that no bounce gains energy.
         floor: Name of the floor; "" by default, for the only one whose `contact` is "rest".
 
     Raises:
-        SceneError: If a number is invalid (see `Term`). A scene refuses it if it has no such floor, or several of which
-            none is named.
+        SceneError: If a number is invalid (see `Term`). A scene refuses this term if it has no such floor, or several such
+            floors and `floor` names none of them.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -101,7 +101,7 @@ class BottomContact(Term):
         return np.zeros((len(speeds), 6, 6))
 
     def stiffest(self, numbers: Numbers, parameters: Numbers, h: float) -> tuple[Array, Array]:
-        """Stiffness and damping at each point as a step has them.
+        """Stiffness and damping at each point for a step.
 
         Args:
             numbers: The term's numbers by field, each of shape (n, ...).
@@ -109,7 +109,7 @@ class BottomContact(Term):
             h: Step [s].
 
         Returns:
-            (n,) [N/m] and (n,) [N s/m].
+            Stiffness (n,) [N/m] and damping (n,) [N s/m].
         """
         points, inertia = repeated(numbers["points"], vehicle.inertia6(parameters))
         springs = np.zeros((len(points), 6, 6))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A random sea of a forecast: JONSWAP or Pierson-Moskowitz spectrum, with spread directions."""
+"""A random sea from a forecast: JONSWAP or Pierson-Moskowitz spectrum, with directional spreading."""
 
 from __future__ import annotations
 
@@ -31,35 +31,37 @@ STEEPEST = 1.0 / 7.0
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SeaState(WaveTerm):
-    """A random sea by its significant height and peak period, a sum of linear waves of equal energy (Goda 2010).
+    """A random sea with a significant height and a peak period, as a sum of linear waves of equal energy (Goda 2010).
 
-    Every member has a sea of its own: the frequency of each component is drawn within its share of the spectrum, so that
-    the record does not repeat. Phase and heading are drawn, too.
+    Every member has its own sea. The frequency of each wave is drawn within its share of the spectrum, so that the surface
+    does not repeat in time. Phases and headings are drawn, too.
 
     Args:
         significant_height: Significant wave height Hs [m], 4 times the standard deviation of the surface.
         peak_period: Period Tp of the spectrum's peak [s].
-        heading_deg: Mean direction in which the waves travel [deg] from north. Forecasts say where they come from: add 180.
-        spectrum: "jonswap", the default (Hasselmann et al. 1973), of young seas; or "pierson_moskowitz", of fully grown ones.
-        peakedness: Peak enhancement of a JONSWAP spectrum, from 1; 3.3 by default.
-        spreading: Exponent s of the directions, spread as cos^2s of half the angle from the mean (Longuet-Higgins et al.
-            1963), whose standard deviation is sqrt(2 / (s + 1)) rad; by default all waves have the mean direction.
-        amplitudes: "equal", the default: every member has exactly Hs; or "rayleigh": random, as in a piece of a long
-            record.
+        heading_deg: Mean direction in which the waves travel [deg] from north. Forecasts give the direction from which the
+            waves come: add 180.
+        spectrum: "jonswap", the default (Hasselmann et al. 1973), for young seas; or "pierson_moskowitz", for fully developed
+            seas.
+        peakedness: Peak enhancement factor of a JONSWAP spectrum, at least 1; 3.3 by default.
+        spreading: Exponent s of the directional distribution, cos^2s of half the angle from the mean (Longuet-Higgins et al.
+            1963). Its standard deviation is sqrt(2 / (s + 1)) rad. By default all waves have the mean direction.
+        amplitudes: "equal", the default, for exactly Hs in every member; or "rayleigh", for random amplitudes as in a section
+            of a long record.
         components: Number of waves; 20 by default.
-        depth: Depth of the sea [m]; by default that of the scene's floor where it is flat, else the water is deep.
-        periods_of: Frame of the periods in a uniform current: "ground", the default, as a moored buoy measures them; or
-            "water", as a buoy that drifts with the current does.
-        seed: Whole number from 0 of a sea that all members share; None, the default: each member has its own sea, by the
-            seed of the ensemble.
+        depth: Depth of the sea [m]; by default that of the scene's floor if it is flat, else the water is deep.
+        periods_of: Frame of the periods in a uniform current: "ground", the default, as measured by a moored buoy; or
+            "water", as measured by a buoy that drifts with the current.
+        seed: Seed, a whole number from 0, of a sea that all members share. None, the default: each member has its own sea,
+            from the seed of the ensemble.
         levels: Uniform random numbers in (0, 1) that determine the frequency, the phase and, if random, the heading and
-            amplitude of each wave, (components, 2 to 4); by default drawn.
+            amplitude of each wave, (components, 2 to 4); by default they are drawn.
 
     Methods:
         density: The spectrum of the surface.
 
     Raises:
-        SceneError: If a number is out of bounds; or a number is invalid (see `Term`).
+        SceneError: If a number is out of bounds or otherwise invalid (see `Term`).
 
     Examples:
         >>> import lgvi_warp as lw
@@ -120,7 +122,7 @@ class SeaState(WaveTerm):
 
     @functools.cached_property
     def _levels(self) -> Array:
-        """The levels, or those of the seed, 0 for none."""
+        """The given levels, or those drawn with the seed; without a seed, those of seed 0."""
         if self.levels is not None:
             return np.asarray(self.levels)
         return uniforms(self.seed or 0, self.type, 0, 1, int(np.prod(self._shape))).reshape(self._shape)
@@ -149,7 +151,7 @@ class SeaState(WaveTerm):
         return amplitude, omega, heading, 2.0 * np.pi * levels[..., 1]
 
     def _ratios(self, levels: Array, numbers: Numbers) -> Array:
-        """Frequencies over that of the peak (n, k) below which the given parts of the energy lie, (n, k)."""
+        """Frequencies divided by the peak frequency (n, k), below which the fractions `levels` (n, k) of the energy lie."""
         if "peakedness" not in numbers:
             return _ratio(levels * GROWN)
         edges = np.linspace(0.0, GROWN, INTERVALS + 1)
@@ -165,13 +167,13 @@ class SeaState(WaveTerm):
         return np.asarray(numbers["significant_height"] / length)
 
     def density(self, frequency: Any) -> Array:
-        """The spectrum of the surface, with the scene's numbers.
+        """Spectral density of the surface elevation, from the term's own numbers.
 
         Args:
-            frequency: Frequencies, of any shape [Hz], above 0.
+            frequency: Frequencies of any shape [Hz], above 0.
 
         Returns:
-            Densities [m^2/Hz] of the same shape, whose integral is Hs^2 / 16.
+            Densities [m^2/Hz] of the same shape; their integral over frequency is Hs^2 / 16.
 
         Examples:
             >>> import lgvi_warp as lw
@@ -187,17 +189,17 @@ class SeaState(WaveTerm):
 
 
 def _ratio(part: Array) -> Array:
-    """Frequency over that of the peak below which a part of the energy of a fully grown sea lies."""
+    """Frequency divided by the peak frequency, below which a fraction of the energy of a fully developed sea lies."""
     with np.errstate(divide="ignore"):
         return np.asarray((FALL / -np.log(part)) ** 0.25)
 
 
 def _middles() -> Array:
-    """Middles of the intervals of that part."""
+    """Midpoints of the intervals of this fraction."""
     return (np.arange(INTERVALS) + 0.5) * (GROWN / INTERVALS)
 
 
 def _enhanced(ratio: Array, peakedness: Any) -> Array:
-    """By how much a JONSWAP spectrum is above a fully grown one, as a factor."""
+    """Factor of a JONSWAP spectrum relative to that of a fully developed sea."""
     breadth = np.where(ratio > 1.0, *BREADTHS[::-1])
     return np.asarray(peakedness ** np.exp(-0.5 * ((ratio - 1.0) / breadth) ** 2))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A tide: the height of the surface by harmonic constituents, a table, or both."""
+"""A tide: the height of the surface from harmonic constituents, a table, or both."""
 
 from __future__ import annotations
 
@@ -22,25 +22,25 @@ WHY = "the largest tides are 8 m above their mean: is it in feet or cm?"
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Tide(SurfaceLevel):
-    """A tide, which moves the surface and leaves the floor and the inertial axes where they are.
+    """A tide, which moves the surface; the floor and the inertial axes stay in place.
 
-    Height of the surface above the depth 0: mean + sum of amplitude cos(2 pi t / period + phase) + table at t. It shifts
-    the surface of `surface_buoyancy`, waves, pressure cells and the event `surface`, and the depths at which a buoyancy
-    engine turns.
+    The height of the surface above the depth 0 is mean + sum of amplitude cos(2 pi t / period + phase) + table at t. The
+    tide shifts the surface of `surface_buoyancy`, waves, pressure cells and the event `surface`, and the depths at which a
+    buoyancy engine reverses.
 
     Args:
         amplitudes: Amplitudes of the constituents, (k,) [m].
-        periods: Their periods, (k,) [s], above 0; or give `speeds`.
-        speeds: Their speeds, (k,) [deg/h], above 0: 28.984 of M2, 30 of S2, 15.041 of K1, 13.943 of O1.
-        phases: Their phases at t = 0, (k,) [rad]; 0 by default. A phase lag g at that time is the phase -g.
+        periods: Periods of the constituents, (k,) [s], above 0; or give `speeds`.
+        speeds: Speeds of the constituents, (k,) [deg/h], above 0: M2 28.984, S2 30, K1 15.041, O1 13.943.
+        phases: Phases of the constituents at t = 0, (k,) [rad]; 0 by default. A phase lag g at t = 0 is the phase -g.
         times: Times of a table, (m,) [s], rising.
-        heights: Heights at these times, (m,) [m], linear between them and held outside; added to the constituents.
-        mean: Height of the mean surface above the depth 0 [m], such as for a chart whose depths are relative to the lowest
-            tide; 0 if omitted.
+        heights: Heights at these times, (m,) [m], added to the constituents; linear between the times, constant outside.
+        mean: Height of the mean surface above the depth 0 [m], for example if the depths of a chart are relative to the
+            lowest tide; 0 if omitted.
 
     Raises:
-        SceneError: If amplitudes have neither periods nor speeds, or both; a table has one column; or a number is
-            invalid (see `Term`).
+        SceneError: If amplitudes have neither periods nor speeds, or both; if only one of `times` and `heights` is given; or
+            if a number is invalid (see `Term`).
 
     Examples:
         >>> import lgvi_warp as lw
@@ -91,7 +91,7 @@ class Tide(SurfaceLevel):
         return CONSERVED
 
     def constituents(self, numbers: Numbers) -> Array:
-        """Constituents by their rows.
+        """Rows of the constituents.
 
         Args:
             numbers: The term's numbers by field, each of shape (n, ...).
@@ -106,7 +106,7 @@ class Tide(SurfaceLevel):
         return np.stack(rows, axis=-1)
 
     def at(self, time: Any) -> Array:
-        """Heights of the surface, with the scene's numbers.
+        """Heights of the surface, from the term's own numbers.
 
         Args:
             time: Times (k,) [s].

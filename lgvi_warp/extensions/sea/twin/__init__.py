@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The NumPy twin, for tests and readers."""
+"""The NumPy twin of the device code, for tests and readers."""

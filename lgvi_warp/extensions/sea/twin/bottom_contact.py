@@ -8,33 +8,33 @@ from lgvi_warp.reference.terms import Law, View, WaterAt
 
 
 class BottomContact(Law):
-    """points (k, 3) [m]; stiffness [N/m], damper [N s/m] at each, as the step has them; friction.
+    """Contact: points (k, 3) [m]; stiffness [N/m] and damper [N s/m] at each point for the step; friction.
 
-    depth and slope (2,): the floor is the plane depth + slope . (north, east). Memory: the anchor (3,) of each point, and 1
-    once there is one.
+    depth and slope (2,): The floor is the plane depth + slope . (north, east). Memory: the anchor (3,) of each point, and 1
+    once the point has an anchor.
     """
 
     def start(self) -> Array:
-        """No anchors."""
+        """Memory at the start, without anchors."""
         return np.zeros(4 * len(self.points))
 
     @property
     def normal(self) -> Array:
-        """Upward out of the floor."""
+        """Unit normal of the floor, upward."""
         n = np.array([*self.slope, -1.0])
         return np.asarray(n / np.linalg.norm(n))
 
     def sunk(self, place: Array) -> float:
-        """Depth of a place in the floor [m]."""
+        """Depth of a point below the floor [m]."""
         return float((self.depth + self.slope @ place[:2] - place[2]) * self.normal[2])
 
     def stretch(self, memory: Array, place: Array) -> Array:
-        """From the anchor to a point along the floor, within 1.25 times the cone of a point at rest."""
+        """Vector along the floor from the anchor to a point, limited to 1.25 times the friction cone of a point at rest."""
         s = memory[3] * (place - memory[:3])
         return within(s - (s @ self.normal) * self.normal, 1.25 * self.friction * max(self.sunk(place), 0.0))
 
     def anchored(self, view: View) -> Array:
-        """Memory after the anchors were dragged along."""
+        """Memory after sliding points have dragged their anchors along."""
         rows = []
         for arm, memory in zip(self.points, view.memory.reshape(-1, 4), strict=True):
             place = view.b + view.R @ arm
@@ -42,7 +42,7 @@ class BottomContact(Law):
         return np.array(rows)
 
     def evolve(self, view: View, second: bool) -> Array:
-        """See `anchored`; after the kick, where its force was."""
+        """See `anchored`; at the end of the kick, for the position of its force."""
         return self.anchored(view) if second else view.memory
 
     def follow(self, view: View) -> Array:
@@ -50,7 +50,7 @@ class BottomContact(Law):
         return self.anchored(view)
 
     def load(self, view: View, water_at: WaterAt) -> tuple[Array, Array]:
-        """Push and friction at each point, by its velocity over ground."""
+        """Push and friction at all points, from their velocities over ground."""
         w, n = np.zeros(6), view.R.T @ self.normal
         for arm, memory in zip(self.points, view.memory.reshape(-1, 4), strict=True):
             place = view.b + view.R @ arm
@@ -65,6 +65,6 @@ class BottomContact(Law):
 
 
 def within(v: Array, most: float) -> Array:
-    """v, or as long as `most` where it is longer."""
+    """v, shortened to the length `most` if it is longer."""
     size = float(np.linalg.norm(v))
     return v * most / size if size > most else v

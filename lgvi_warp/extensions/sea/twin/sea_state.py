@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A random sea of a forecast."""
+"""A random sea from a forecast."""
 
 import functools
 import math
@@ -15,18 +15,18 @@ NODES, WEIGHTS = np.polynomial.legendre.leggauss(100)
 
 
 class SeaState(Waves):
-    """Numbers as those of `lw.terms.SeaState`; gravity [m/s2]."""
+    """Numbers of `lw.terms.SeaState`; gravity [m/s2]."""
 
     spectrum, amplitudes_are, peakedness, spreading = "jonswap", "equal", 3.3, None
 
     def enhanced(self, x: float) -> float:
-        """JONSWAP over Pierson-Moskowitz at a frequency over that of the peak (Hasselmann et al. 1973)."""
+        """Ratio of JONSWAP to Pierson-Moskowitz at x, frequency divided by peak frequency (Hasselmann et al. 1973)."""
         if self.spectrum != "jonswap":
             return 1.0
         return float(self.peakedness ** math.exp(-((x - 1.0) ** 2) / (2.0 * (0.07 if x <= 1.0 else 0.09) ** 2)))
 
     def ratios(self) -> Array:
-        """Frequencies over that of the peak: the energy up to each, in parts of a fully grown sea's, exp(-5/4 x^-4)."""
+        """Frequencies x divided by the peak's, from the energy below x; exp(-5/4 x^-4) in a fully developed sea."""
         most, parts = math.exp(-1.25 * CUT**-4), [0.0]
         for i in range(INTERVALS):
             parts.append(parts[-1] + self.enhanced(_ratio(most * (i + 0.5) / INTERVALS)))
@@ -50,7 +50,7 @@ class SeaState(Waves):
 
     @functools.cached_property
     def headings_deg(self) -> Array:
-        """Headings of the waves [deg]: the integral of cos^2s of half the angle from the mean is the level."""
+        """Headings of the waves [deg]: the level is the integral of cos^2s of half the angle from the mean."""
         if self.spreading is None:
             return np.full(len(self.levels), self.heading_deg)
         total = self.below(0.5 * math.pi)
@@ -66,7 +66,7 @@ class SeaState(Waves):
 
     @property
     def amplitudes(self) -> Array:
-        """Amplitudes of the waves [m], whose squares sum up to Hs^2 / 8."""
+        """Amplitudes of the waves [m]; their squares add up to Hs^2 / 8."""
         count = len(self.levels)
         equal = np.full(count, self.significant_height / math.sqrt(8.0 * count))
         return equal * np.sqrt(-np.log(self.levels[:, -1])) if self.amplitudes_are == "rayleigh" else equal

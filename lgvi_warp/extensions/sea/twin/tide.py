@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A tide, and laws below it."""
+"""A tide, and laws that depend on the depth below its surface."""
 
 import math
 from dataclasses import replace
@@ -13,7 +13,7 @@ from lgvi_warp.reference.terms.waves import Waves
 
 
 class Tide(Law):
-    """Numbers as those of `lw.terms.Tide`: amplitudes, periods and phases (k,); times and heights (m,); mean."""
+    """Numbers of `lw.terms.Tide`: amplitudes, periods and phases (k,); times and heights (m,); mean."""
 
     amplitudes: Any = ()
     periods: Any = ()
@@ -31,19 +31,19 @@ class Tide(Law):
 
 
 class InTide(Law):
-    """A law of the depth below the surface: law, tide."""
+    """A law that depends on the depth below the tide's surface."""
 
     @property
     def inner(self) -> Any:
-        """The law, which may be a twin with numbers of its own."""
+        """The law, which may be a twin with its own numbers."""
         return vars(self)["law"]
 
     def below(self, view: View) -> View:
-        """The view from the depth below the surface."""
+        """The view with the depth below the tide's surface."""
         return replace(view, b=view.b + np.array([0.0, 0.0, self.tide.height(view.t)]))
 
     def wrench(self, view: View) -> tuple[Array, Array]:
-        """Wrench of the law at its depth below the surface."""
+        """Wrench of the law at its depth below the tide's surface."""
         return self.inner.wrench(self.below(view))
 
     def flow(self, view: View) -> Flow:
@@ -63,6 +63,6 @@ class InTide(Law):
         return self.inner.follow(self.below(view))
 
     def beside(self, laws: tuple[Law, ...]) -> Law:
-        """The law among some laws, of which waves are those below the tide."""
+        """The law beside other laws, whose waves are below the tide."""
         waves = tuple(law.inner if isinstance(law, InTide) and isinstance(law.inner, Waves) else law for law in laws)
         return InTide(law=self.inner.beside(waves), tide=self.tide)

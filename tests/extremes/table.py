@@ -20,33 +20,39 @@ TELLING = 0.01
 
 TEXT = """# At the extremes
 
-For readers who want to know how rounding and extreme inputs affect a run. Each row of the tables is one vehicle at an
-extreme. The kernel runs it, and the same map runs it in extended precision, with the same steps (NumPy's longdouble,
-`tests/extremes/extended.py`). A cell has the error at the end and its derived bound, or the status of the vehicle.
-`tests/extremes/test_extremes.py` runs every row, and asserts that errors are within their bounds and statuses as
+For readers who want to know how rounding and extreme inputs affect a run. Each row of the tables is one vehicle with
+extreme numbers. It is simulated twice with the same method and steps: by the kernel, and in extended precision
+(NumPy's longdouble, `tests/extremes/extended.py`). A cell has the error at the end of the run and a bound of this
+error, or the status of the vehicle. "Accurate" means: status OK and an error below the bound.
+`tests/extremes/test_extremes.py` runs every row, and asserts that errors are within their bounds and statuses are as
 expected.
 
-* **error**: the largest of |R - R*|, |p - p*| / |p| and |pi - pi*| / |pi|, the effect of rounding. R*, p* and pi* are
-  of the run in extended precision. The error of the method, of second order in the step, is not included (see
-  [accuracy and speed](../guide/accuracy_and_speed.md)).
+* **error**: the effect of rounding, the largest of |R - R*|, |p - p*| / |p| and |pi - pi*| / |pi|. R is the attitude,
+  p the momentum and pi the angular momentum. R*, p* and pi* are the values of the run in extended precision. Both
+  runs have the same error of the method, of second order in the step, so it is not included (see [accuracy and
+  speed](../guide/accuracy_and_speed.md)).
 * **bound**: G (3 sqrt(n) ({roundings} u + 2 t) + {constants} n u) for n steps. u is the unit of round-off (2^-53 or
-  2^-24). t is the tolerance to which psi_s solves its equation (24), twice a step (psi_x solves no equation).
-  {constants} is the number of constants that are rounded once for all steps. G is the growth of a small error during
-  the run, from runs in extended precision with slightly different starts. *lost*: the bound is above 1, so the phase of
-  this unstable motion is unknown in this precision.
-* Positions are asserted too, to the bound times the path length plus 4 n u times the distance from the origin. In
-  float32 at 1e7 m this is metres a step, more than the vehicle moves, and the status is OK. If a position is off by
-  more than a hundredth of the path length, the cell says so. `dtype="float32_compensated"` has no such error.
+  2^-24), and a step adds errors of {roundings} u. psi_s solves [equation (24)](../theory/rotation.md) twice a step,
+  each time to the tolerance t; psi_x solves no equation, so t = 0. {constants} is the number of constants that are
+  rounded once for all steps. G is the growth of a small error during the run. It is measured by runs in extended
+  precision with slightly different starts. *lost*: the bound is above 1, so in this precision the phase of this
+  unstable motion is unknown.
+* **position**: errors of positions have a bound of their own, the bound above times the path length plus 4 n u times
+  the distance from the origin. In float32 at 1e7 m from the origin this bound grows by metres a step, more than the
+  vehicle moves, and the status is still OK. If the position error exceeds a hundredth of the path length, the cell
+  states it. `dtype="float32_compensated"` has no such error.
+* **must be**: the expected outcome, which the tests require.
 
 Statuses: {statuses}.
 
-Not in the tables: a negative, zero, infinite or subnormal mass or inertia is refused before the run. A member whose
-start is not finite gets NON_FINITE or STEP_TOO_LARGE. No bit of another vehicle changes. Tests have one such member
-among 100,000, or only such members (`tests/extremes/test_inputs.py`, `test_neighbours.py`). rk8 with tolerances shares
-its steps within a packet, so other vehicles in the packet of a failing vehicle change, within their tolerance. Explicit
-methods such as rk4 never report STEP_TOO_LARGE. The kernel sets subnormal numbers (below 1e-38 in float32, 2e-308 in
-float64) to zero. A body that damping brings to rest keeps momenta of about this size, and its steps take as long as
-before (`tests/extremes/test_rest.py`).
+Other extremes are not in the tables. A negative, zero, infinite or subnormal mass or inertia is refused before the
+run. A member whose start is not finite gets NON_FINITE or STEP_TOO_LARGE. It leaves the bits of all other vehicles
+unchanged. The tests have one such member among 100,000, or only such members (`tests/extremes/test_inputs.py`,
+`test_neighbours.py`). With tolerances, the vehicles of a packet share the steps of rk8. A failing vehicle then
+changes the other vehicles of its packet, within their tolerance. Explicit methods such as rk4 never report
+STEP_TOO_LARGE. The kernel sets subnormal numbers (below 1e-38 in float32, 2e-308 in float64) to zero. A body that
+damping brings to rest ends with momenta of about this size. Its steps then take as long as before
+(`tests/extremes/test_rest.py`).
 
 Machine: {cpu}, {simd}. Written by `python -m tests.extremes.table`; do not edit.
 

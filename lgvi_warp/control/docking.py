@@ -41,7 +41,7 @@ class Docking(Guidance):
         judged: Distance from the dock within which a vehicle must be in the funnel [m], at most `approach`.
         offset: Distance to starboard of the line's beginning at which a new approach begins [m]; 0 by default. With an
             offset of twice the turning radius, the vehicle ends its turn on the line.
-        kappa: Gain of the integral [1/s]; 0.1 by default.
+        kappa: Gain of the integral [m/s]; 0.1 by default.
 
     Raises:
         SceneError: If `judged` exceeds `approach`, `contact_speed` exceeds `speed`, or a number is invalid (see `Term`).
@@ -68,7 +68,7 @@ class Docking(Guidance):
     approach: Any = number((), "m", above=0.0)
     judged: Any = number((), "m", least=0.0)
     offset: Any = number((), "m", 0.0)
-    kappa: Any = number((), "1/s", 0.1, least=0.0)
+    kappa: Any = number((), "m/s", 0.1, least=0.0)
 
     def check(self, faults: Faults) -> None:
         for small, great in (("judged", "approach"), ("contact_speed", "speed")):

@@ -47,7 +47,7 @@ class Waypoints(Guidance):
         look_ahead: Look-ahead distance D [m].
         radius: Radius of acceptance [m], horizontal.
         method: "los", "ilos" or "alos"; by default "los".
-        kappa: Gain of "ilos" [1/s]; 0.1 by default.
+        kappa: Gain of "ilos" [m/s]; 0.1 by default.
         gamma: Gain of "alos" [rad/(m s)]; 0.002 by default.
         at_end: Behaviour at the last point. With "stop", the default, the wanted heading is that of the last leg, the wanted
             speed 0 and the wanted position the last point. With "go_on", the vehicle continues along the last leg beyond its
@@ -79,7 +79,7 @@ class Waypoints(Guidance):
     radius: Any = number((), "m", above=0.0)
     geodetic: Any = array(None, unit=PLACE_UNIT)
     method: str = word("los", known=METHODS)
-    kappa: Any = number((), "1/s", 0.1, least=0.0)
+    kappa: Any = number((), "m/s", 0.1, least=0.0)
     gamma: Any = number((), "rad/(m s)", 0.002, least=0.0)
     at_end: str = word("stop", known=AT_END)
     times: Any = number(("k",), "s", None, optional=True, rising=True)

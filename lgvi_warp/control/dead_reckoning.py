@@ -18,9 +18,9 @@ DEPTHS = ("reckoned", "measured")
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class DeadReckoning(MeasuringPart):
-    """Dead reckoning: position from measured attitude and velocity, starting at the position of the first tick.
+    """Dead reckoning: integrate the measured velocity, from the measured position at the first tick.
 
-    List it after the sensors that it uses. Without a position sensor it starts at the true position.
+    List it after the sensors that it uses. Without a position sensor, the integration starts at the true position.
 
     Args:
         rule: "trapezoid", the default, integrates the mean of the velocities at the previous and the present tick; "euler"

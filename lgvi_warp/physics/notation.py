@@ -51,7 +51,7 @@ def hat(a: np.ndarray) -> np.ndarray:
 
 
 def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Cross products, as by np.cross, but in a third of its time for few vectors.
+    """Cross products, as by np.cross, but three times as fast for few vectors.
 
     Args:
         a: Vectors (..., 3).
@@ -82,7 +82,7 @@ def to_momenta(M: np.ndarray, J: np.ndarray, nu: np.ndarray, Om: np.ndarray) -> 
 
 
 def principal_axes(J: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Principal axes of inertia: J = Q diag(d) Q^T with det Q = +1. A diagonal J keeps its axes and their order.
+    """Principal axes Q and moments d of inertia: J = Q diag(d) Q^T, det Q = +1. A diagonal J keeps its axes and their order.
 
     Args:
         J: Inertia (n, 3, 3) [kg m2], symmetric.
@@ -101,7 +101,7 @@ def principal_axes(J: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def off_diagonal(matrices: np.ndarray) -> np.ndarray:
-    """The entries of 3x3 matrices off their diagonals.
+    """The off-diagonal entries of 3x3 matrices.
 
     Args:
         matrices: Matrices (n, 3, 3).

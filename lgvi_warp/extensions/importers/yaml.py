@@ -72,7 +72,7 @@ def from_yaml(
         ignore: Keys to leave out; other unknown keys are refused. By default none.
         table: Path in the file to the table to read, such as "vehicle.dynamics", or a list of keys; by default the whole
             file.
-        **given: Values by key (mass=..., density=...) that are added to those of the file or replace them.
+        **given: Values by key (mass=..., density=...), which are added to the values of the file or replace these.
 
     Returns:
         The tables "vehicle", "environment" and "terms" of a scene file.

@@ -41,7 +41,7 @@ class DensityProfile(Term):
         depths: Depths, (k,) [m], rising.
         densities: In-situ densities at these depths, (k,) [kg/m3], that is, at the pressure of the depth.
         compressibility: Relative loss of the hull's volume per depth [1/m]; none by default.
-        reference_depth: The depth d0 at which the hull has its volume B / (rho0 g) [m]; 0 if omitted.
+        reference_depth: Depth d0 at which the hull's volume is B / (rho0 g) [m]; 0 if omitted.
 
     Methods:
         from_cast: Profile of a CTD cast, from arrays of temperature and salinity or from a file.
@@ -91,7 +91,7 @@ class DensityProfile(Term):
 
         Raises:
             SceneError: If a column is missing or invalid; the message names the remedy.
-            MissingExtra: If gsw is not installed, which computes densities from temperatures and salinities.
+            MissingExtra: If temperatures are given, and the package gsw, which computes the densities, is not installed.
 
         Examples:
             >>> import lgvi_warp as lw

@@ -42,7 +42,7 @@ def gather(result: Result | str | os.PathLike[str], statistics: Sequence[Any], w
         statistics: Statistics, as in `lw.solve`, or their tables from a scene file.
         weights: Weights of the members for importance sampling (n,), at least 0; only their ratios count. With weights
             the members represent another distribution than the one from which they were drawn. By default the weights
-            of the run are used (see lw.designs.Table), or equal weights if it has none. Given weights, the members of a
+            of the run are used (see lw.designs.Table), or equal weights if it has none. With weights, the members of a
             Sobol sequence or another design are treated as independent; the confidence intervals are therefore wide.
 
     Returns:

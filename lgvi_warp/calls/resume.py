@@ -45,7 +45,7 @@ def resume(
         scheduler: Address of Dask's scheduler.
         progress: As in `lw.solve`.
         force: Whether to resume on another machine or with other software versions, which may change the bits.
-        keepers: The keepers that were passed to the run.
+        keepers: The keepers (objects that store a run's data, internal) that were passed to the run.
         statistics: The statistics that were passed to the run. Needed if one uses a function, which a store cannot save.
 
     Returns:

@@ -84,7 +84,7 @@ def solve(
         keep: Members whose samples are kept. "all" (default) keeps every member. With "none", memory does not grow with
             members or steps. "failed" or indices of members: these members run again after the run, with the same bits,
             and their samples are in result.kept. A member that an event stopped has not failed.
-        until: lw.Until(...) ends the run before all members have run, if the interval of a statistic is narrow enough.
+        until: lw.Until(...) ends the run before all members have run, once the interval of a statistic is narrow enough.
             False runs all members, even if the scene has such a rule.
         store: A folder "runs/x/run.zarr", or a Store with more settings. Samples are written there block by block and
             are not held in memory. lw.resume completes the run if it is interrupted.
@@ -93,7 +93,7 @@ def solve(
         blocks: With a store, the blocks to run, such as range(0, 100), for a run in parts. The range may go beyond the
             last block. The result has the members of these blocks.
         on_block: Function to monitor a run. It is called with a copy of each block's Result as soon as the block is
-            finished, in order and in the calling thread. By default there is none.
+            finished, in the order of the blocks and in the calling thread. By default there is none.
         start: `result.final` of another run of these members, to continue it. With the same settings and numbers, the
             two runs give the same bits as one long run. Samples, statistics and messages are those of the new run only.
             By default the members start at t = 0.

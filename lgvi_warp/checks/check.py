@@ -75,7 +75,7 @@ def check_law(
       that varies in space and time.
     * `follow`: the stored memory depends on the time alone, and is the same after two parts of an interval as after the
       whole interval.
-    * `carried_inertia` is symmetric. It and `carried_momentum` do not depend on velocities.
+    * `carried_inertia` is symmetric. Neither `carried_inertia` nor `carried_momentum` depends on velocities.
     * `distance` is the same in all body axes; `power` also about all origins.
     * `flow`: rate and gradient are derivatives of the velocity. `water` gives the same velocity. The constant FLOW
       ("steady", "uniform" or "varying") allows the variation of the velocity.

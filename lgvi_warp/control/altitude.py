@@ -34,7 +34,7 @@ class Altitude(Guidance):
         source: "altimeter", the default, or "chart".
         altimeter: Name of the altimeter; "", the default, stands for the only altimeter of the controller.
         floor: Name of the floor that serves as chart; "", the default, stands for the only floor of the scene.
-        look_ahead: Distance ahead, along the heading, at which the chart is read as well [m]; 0 by default.
+        look_ahead: Distance ahead, along the heading, at which the chart is read in addition [m]; 0 by default.
         shallowest: Least value of the wanted depth [m]; 0 by default.
         deepest: Largest value of the wanted depth [m]; 12,000 by default.
 

@@ -587,7 +587,7 @@ class Allocation(Part):
 
         Args:
             faults: Faults of actuators.
-            components: 1 for each of X Y Z K M N that some law demands, else 0, (6,).
+            components: Six numbers for X Y Z K M N: 1 if some law demands the component, otherwise 0.
 
         Returns:
             A copy.

@@ -247,7 +247,7 @@ class Controller(Documented):
 
     @property
     def asked(self) -> np.ndarray:
-        """1 for each of X Y Z K M N that some law demands, else 0, (6,)."""
+        """Six numbers for X Y Z K M N: 1 if some law demands the component, otherwise 0."""
         names = {name for law in self.laws for name in law.demands or COMPONENTS}
         return np.array([float(name in names) for name in COMPONENTS])
 

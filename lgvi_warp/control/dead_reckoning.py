@@ -25,8 +25,8 @@ class DeadReckoning(MeasuringPart):
     Args:
         rule: "trapezoid", the default, integrates the mean of the velocities at the previous and the present tick; "euler"
             integrates the velocity at the previous tick.
-        velocity: Velocity that is integrated: "velocity", the default, over ground; or "water_velocity", through the water,
-            with which the estimate drifts in a current.
+        velocity: "velocity", the default, integrates the velocity over ground. "water_velocity" integrates the velocity
+            through the water, so that the estimate drifts in a current.
         depth: "reckoned", the default, computes the depth from the velocity, like north and east; "measured" uses the
             measured depth.
         start_error: Error added to the position of the first tick, (3,) [m], inertial axes; 0 by default.

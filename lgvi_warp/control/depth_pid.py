@@ -27,7 +27,7 @@ class DepthPID(IntegralLaw):
         ki_pitch: Gain of I_theta, the integral of the pitch error [N m/(rad s)]; 0 by default.
         kd_pitch: Gain of the pitch rate q [N m s/rad]; 0 by default.
         k_heave: Gain of the heave velocity w [N s]; 0 by default.
-        integral_limit: Largest sizes of both integrals, (2,) [m s, rad s]; 1e6 by default.
+        integral_limit: Largest sizes of I and of I_theta, (2,) [m s, rad s]; 1e6 by default.
         anti_windup: "conditional", the default, stops an integrator while the actuators do not deliver the whole demand
             and the integrator's error would increase the missing part. It also stops the depth's integrator while the
             wanted pitch is at its limit. "none" never stops an integrator.

@@ -60,8 +60,8 @@ class Fault(Sending):
     Args:
         of: Key of the term or of the sensor.
         channel: Index of the channel, from 0, or "all"; 0 by default. For a sensor, index of the number in its reading: an
-            attitude has roll, pitch and yaw [rad]. For sensors of an estimator, a channel of a `DVL` is a beam. Those of
-            an `IMU` are the means over a period of specific force (0 to 2) [m/s^2] and angular rate (3 to 5) [rad/s].
+            attitude has roll, pitch and yaw [rad]. For sensors of an estimator, a channel of a `DVL` is a beam. An `IMU`
+            has as channels the means over a period of specific force (0 to 2) [m/s^2] and angular rate (3 to 5) [rad/s].
         kind: Kind of fault, or a list of kinds from which `choice` selects; "gain" by default.
         choice: Index of the kind in the list `kind`, from 0; 0 by default.
         time: Time at which the fault begins [s]; 0 by default; inf for never.

@@ -188,7 +188,7 @@ def rotate_out(Q: np.ndarray, vectors: np.ndarray) -> np.ndarray:
 
 
 def matrix_from_rotation_vector(f: np.ndarray) -> np.ndarray:
-    """Rotation matrix exp(hat(f)) by Rodrigues' formula; exact to round-off at f = 0.
+    """Rotation matrix exp(hat(f)) by Rodrigues' formula; accurate to round-off also near f = 0.
 
     Args:
         f: Rotation vectors (..., 3) [rad].
@@ -222,7 +222,7 @@ def matrix_from_quaternion(q: np.ndarray) -> np.ndarray:
 
 
 def quaternion_from_matrix(R: np.ndarray) -> np.ndarray:
-    """Unit quaternion of a rotation matrix (Shepperd 1978, which divides by the largest of the four components).
+    """Unit quaternion of a rotation matrix, by the method of Shepperd (1978), which divides by the largest component.
 
     Args:
         R: Rotation matrices (..., 3, 3).

@@ -72,8 +72,8 @@ class Result(Summarized):
             attitude (k, n, 3, 3) body to inertial, velocity (k, n, 3) [m/s, body], angular_velocity (k, n, 3) [rad/s, body].
             Signals of a controller need SaveAt(fields=...), and are the values after the tick at each time. These are
             command (k, n, channels); actuator (k, n, channels), after delay, fault, limit and lag; demand, unmet and
-            exerted (k, n, 6) [N, N m]; measured_position, _attitude, _velocity, _water_velocity, _angular_velocity, _depth,
-            _heading; reference_position, _attitude, _velocity (inertial), _angular_velocity, _depth, _heading, _speed.
+            exerted (k, n, 6) [N, N m]; "measured_" with position, attitude, velocity, water_velocity, angular_velocity, depth
+            or heading; "reference_" with position, attitude, velocity (inertial), angular_velocity, depth, heading or speed.
             Signals of a filter (see lw.control.ErrorStateFilter) are estimate_sigma (k, n, 15), estimate_bias (k, n, 6),
             nees, nis, nis_count (k, n), innovation and innovation_sigma (k, n, 12). energy_used (k, n) [J] needs a term
             `lw.terms.EnergyUse`; navigation_error (k, n, 3) [m, inertial] needs an estimate of the position.
@@ -324,7 +324,7 @@ class Result(Summarized):
             places: Indices of the members in this result, counted from 0, shape (m,); a slice; or a mask (n,).
 
         Returns:
-            A result of these members alone. Its statistics are those of the whole run.
+            A result of these members alone. Its `statistics` are still the statistics of the whole run.
 
         Raises:
             SceneError: If the result does not have these members (this error is also an IndexError).

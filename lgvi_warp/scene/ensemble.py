@@ -45,7 +45,7 @@ class Ensemble(Summarized, Documented):
       field), ...
     * the numbers that the scene's start gives: "start.position", "start.angular_velocity", ..., and always
       "start.attitude";
-    * one entry of these: "start.position[2]";
+    * one entry of such a vector or matrix: "start.position[2]";
     * several numbers that one distribution draws jointly: "vehicle.mass, vehicle.buoyancy".
 
     A distribution for a vector applies to each entry. A distribution for a symmetric matrix applies to the entries on and

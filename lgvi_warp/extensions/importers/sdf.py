@@ -55,7 +55,7 @@ def from_sdf(
     Args:
         source: Path of the file, or its text.
         model: Name of the model, if the file holds several.
-        link: Name of the main link; by default the link named by the plugin, else the first of the heaviest joined links.
+        link: Name of the main link; by default the link that the plugin names, or the first of the heaviest joined links.
         world: Another SDF file (path or text) with a <world> that gives gravity and density for the model.
         buoyancy: Buoyancy [N], instead of the buoyancy of the shapes.
         volume: Displaced volume [m3], instead of the volume of the shapes.

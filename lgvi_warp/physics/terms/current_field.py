@@ -122,7 +122,7 @@ class CurrentField(InFile, Term):
             name: As in `Term`.
 
         Returns:
-            The field. Its `data` has the number of missing values, and the largest change by the regular grid [m/s].
+            The field. Its `data` has the number of missing values, and the largest change of a velocity by regridding [m/s].
 
         Raises:
             SceneError: If the data set has no known velocities, has unknown axes, or does not cover the region or the times;

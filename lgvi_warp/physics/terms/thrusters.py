@@ -65,8 +65,8 @@ class Thrusters(Commanded):
         torque_coefficient: Torque on the vehicle about the direction per unit of w |w|, (n,) [N m per unit^2]. Its sign
             depends on the propeller's sense of rotation. None by default.
         torque_loss: Loss of torque, (n,) [N m per unit and m/s], with the sign of the torque; 0 by default.
-        power_commands: Commands of a table of power, (s,) [unit], rising, beyond the dead band like those of thrust; by
-            default `table_commands`.
+        power_commands: Commands of a table of power, (s,) [unit], rising; these are values of w, as in the table of thrust.
+            By default `table_commands`.
         power: Electrical power at these commands, (s, n) [W], or (s,) for n equal thrusters, linear between the commands and
             constant outside. None by default, for no power (see `EnergyUse`).
         shaft_speed: Angular speed of the propeller per unit of w, (n,) [rad/s per unit], instead of a table. The power is then

@@ -49,7 +49,7 @@ def movie(
         members: Indices of the members to draw, such as [3, 17]; by default the choice of `lgvi_warp.select_members`.
         frames: Number of pictures, evenly spaced over the run's time, at least 2; default 60.
         seconds: Duration of the animation [s], above 0; it then repeats. Default 6.
-        by: "viewer" draws only by the viewer, "plot" only by Matplotlib. By default by Matplotlib if the viewer cannot.
+        by: "viewer" draws with the viewer, "plot" with Matplotlib. By default Matplotlib draws only if the viewer cannot.
 
     Returns:
         The path of the file.

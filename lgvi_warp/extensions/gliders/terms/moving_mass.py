@@ -36,7 +36,7 @@ LIGHT = 0.1
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class MovingMass(Term):
-    """A mass in the vehicle that moves along a path, by commands, or both: a sliding and rolling battery, a trim weight.
+    """A mass in the vehicle, such as a battery or a trim weight, that moves along a path, by commands, or in both ways.
 
     The vehicle's mass, inertia and center of gravity must include this mass at its reference position r0. At the position r
     its weight adds the torque (r - r0) x m g R^T e3, where R^T e3 is the downward vertical in body axes. A path is linear
@@ -45,7 +45,7 @@ class MovingMass(Term):
 
     A controller commands up to two channels: the distance by which the mass slides from the path [m], and the angle by
     which the mass and its slide direction turn about an axis [rad]. A channel n follows n' = (command - n) / time constant,
-    with |n'| at most the rate limit and the command within the limit. Both are 0 at the start and without a controller.
+    with |n'| at most the rate limit and the command within the limit. Channels are 0 at the start and without a controller.
 
     Args:
         mass: Mass m [kg].

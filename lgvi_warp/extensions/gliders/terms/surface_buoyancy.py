@@ -118,7 +118,8 @@ class SurfaceBuoyancy(Term):
 
         Returns:
             (n, parts, 6): position relative to the centre of buoyancy [m], buoyancy [N], half-height [m] and its inverse, and
-            `tilt` and `stretch` of the vertical extent c H, with c^2 = 1 - tilt a^2 + stretch a^4, a the sine of the pitch.
+            `tilt` and `stretch`. A section of height H has the vertical extent c H, where c^2 = 1 - tilt a^2 + stretch a^4 and
+            a is the sine of the pitch.
         """
         x, heights, buoyancy = numbers["stations"], numbers["heights"], buoyancy[:, None]
         if x.shape[1] == 1:

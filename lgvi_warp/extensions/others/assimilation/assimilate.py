@@ -95,7 +95,7 @@ def assimilate(
             are left out, with a message. For several values of one instrument, a chi-square test of the same probability is
             used. None accepts all values; 5.0 by default.
         inflation: Factor on the covariance of the members before each measurement, at least 1 (default), for Kalman filters
-            that become overconfident; or "adaptive", which estimates it from the innovations (Anderson 2009, Miyoshi 2011).
+            that become overconfident; or "adaptive" to estimate it from the innovations (Anderson 2009, Miyoshi 2011).
         threads: As in `lw.solve`.
         progress: As in `lw.solve`.
 

@@ -40,7 +40,8 @@ class BottomContact(Term):
         points: Points of the hull that may touch the floor, (k, 3) [m] from the body's origin.
         friction: Coefficient of friction, the tangent of the friction cone's angle; 0.5 by default.
         stiffness: Stiffness of the floor at each point [N/m]; by default the limit for the step.
-        damping: Damping at each point [N s/m]; by default the limit for the step, but enough that no bounce gains energy.
+        damping: Damping at each point [N s/m]; by default critical damping. The step sets an upper bound, and a lower bound
+            that lets no bounce gain energy.
         floor: Name of the floor; "", the default, stands for the only floor whose `contact` is "rest".
 
     Raises:

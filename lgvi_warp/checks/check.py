@@ -76,9 +76,9 @@ def check_law(
     * `follow`: the stored memory depends on the time alone, and is the same after two parts of an interval as after the
       whole interval.
     * `carried_inertia` is symmetric. Neither `carried_inertia` nor `carried_momentum` depends on velocities.
-    * `distance` is the same in all body axes; `power` also about all origins.
+    * `distance` and `power` are the same in all body axes, and `power` about all origins.
     * `flow`: rate and gradient are derivatives of the velocity. `water` gives the same velocity. The constant FLOW
-      ("steady", "uniform" or "varying") allows the variation of the velocity.
+      ("steady", "uniform" or "varying") covers the observed variation of the velocity.
 
     Args:
         term: the term, built-in or the user's own.

@@ -563,7 +563,7 @@ class Allocation(Part):
         actuator: The term that takes the commands.
 
     Methods:
-        reach: The wrench of one unit of each command.
+        reach: The wrench of each channel.
     """
 
     section: ClassVar[str] = "allocation"

@@ -264,7 +264,7 @@ class Controller(Documented):
 
     @property
     def rejected_rows(self) -> int:
-        """Number of rows, among those of the estimator, that count the readings rejected by its gate."""
+        """Number of rows, among those of the estimator, that count the readings that the estimator's gate rejected."""
         return sum(part.rejected_rows for part in self.sensors)
 
     def _effect(self) -> np.ndarray:

@@ -29,7 +29,7 @@ class DepthPID(IntegralLaw):
         k_heave: Gain of the heave velocity w [N s]; 0 by default.
         integral_limit: Largest sizes of I and of I_theta, (2,) [m s, rad s]; 1e6 by default.
         anti_windup: "conditional", the default, stops an integrator while the actuators do not deliver the whole demand
-            and the integrator's error would increase the missing part. It also stops the depth's integrator while the
+            and the integrator's error would increase the missing part, and the depth's integrator also while the
             wanted pitch is at its limit. "none" never stops an integrator.
 
     Examples:

@@ -54,8 +54,8 @@ class Fault(Sending):
 
     The fault begins at the first tick at or after `time` and ends at the first tick at or after `until`. A sensor's fault
     acts directly after the sensor, on the reading that has arrived. If an estimator takes the readings, the fault acts on
-    these, and kinds that use earlier readings use only new ones. Laws are not informed of a fault, and their integrals
-    continue.
+    the readings that it takes, and a fault with memory remembers only new readings. Laws are not informed of a fault, and
+    their integrals continue.
 
     Args:
         of: Key of the term or of the sensor.

@@ -17,7 +17,7 @@ class PosePID(PoseLaw):
     The demand is f = R^T (kp e_b + ki I) + kd (R^T v_d - nu) and tau = -kr e_R - kw (Omega - R^T R_d Omega_d) - ki_r I_R.
     The errors are e_b = b_d - b and e_R = vee(R_d^T R - R^T R_d) / 2; the index d marks wanted values. The integrals I and
     I_R grow by e_b and e_R times the period at each tick. b: position, R: attitude (body to inertial axes), nu and Omega:
-    velocity and angular velocity in body axes, v_d: wanted velocity in inertial axes, vee: vector of a skew matrix.
+    velocity and angular velocity in body axes, v_d: wanted velocity in inertial axes, vee: inverse of `lw.notation.hat`.
 
     Args:
         kp: Gains of the position error (3,) [N/m], inertial axes.

@@ -73,7 +73,7 @@ class Sensor(MeasuringPart):
         deepest: Depth of the sensor below which readings are lost [m], as for GPS; inf by default.
         place: Position of a sensor of position or depth on the body, such as an antenna, (3,) [m], body axes; by default the
             body's origin. The sensor reads the position or depth of this point.
-        reads: Reading of a depth. "geometry", the default, is the distance from the mean surface. "pressure" is the
+        reads: Kind of depth reading. "geometry", the default, is the distance from the mean surface. "pressure" is the
             reading p / (rho g) of a pressure cell below the scene's tide. It includes the pressure of waves by linear theory,
             which decays with depth, and is 0 out of the water.
 

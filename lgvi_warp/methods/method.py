@@ -156,14 +156,14 @@ class Method(Summarized, Documented):
 
             * "phi", "phi_adjoint", "psi": the maps of Nordkvist & Sanyal 2010;
             * "psi_s" (default), "psi_1", "psi_x", "psi_x8", "psi_w": symmetric splittings of order 2;
-            * a composition of a symmetric method: "tj4(psi_s)", "su4(psi_s)", "kl6(psi_1)", "kl8(psi_s)" and so on; or
-              of the two halves of its step: "bm4(psi_x)", "bm6(psi_x)";
+            * a composition of a symmetric method, such as "tj4(psi_s)", "su4(psi_s)", "kl6(psi_1)" or "kl8(psi_s)";
+              or of the two halves of its step: "bm4(psi_x)", "bm6(psi_x)";
             * "rkn4_6", "rkn6_11", "rkn6_14": splittings into two parts, for weight and restoring moment;
             * "gauss4" to "gauss12": Gauss collocation with fixed-point iteration, for forces that depend on position
               and time;
-            * explicit Runge-Kutta methods that store R as two rows: "rk4", "rk5" (Dormand & Prince), "rk5_ck" (Cash &
-              Karp), "rk8" (of DOP853); explicit methods on the rotation group: "cg3" (Crouch & Grossman), "rkmk4"
-              (Munthe-Kaas);
+            * explicit Runge-Kutta methods that store two rows of the attitude matrix: "rk4", "rk5" (Dormand & Prince),
+              "rk5_ck" (Cash & Karp), "rk8" (of DOP853); explicit methods on the rotation group: "cg3" (Crouch &
+              Grossman), "rkmk4" (Munthe-Kaas);
             * "rkw3": linearly implicit in the damping, for strong damping and steady motion; without damping it is "rk4".
         solver: Solver of equation (24) of Nordkvist & Sanyal: "quartic" (default), "cayley", "newton" (on the exponential
             map, as in the paper) or "moser_veselov" (explicit).
@@ -377,7 +377,7 @@ class Method(Summarized, Documented):
             dtype: "float64", or one of the float32 types.
 
         Returns:
-            `tolerance` if set, else the default for this dtype and for the kind of iteration.
+            `tolerance` if set, otherwise the default for this dtype and for the kind of iteration.
         """
         if self.tolerance is not None:
             return self.tolerance

@@ -83,8 +83,8 @@ class Result(Summarized):
         failure_value: The value that crossed its limit, shape (n,): |J^-1 a| or the relative residual of equation (24)
             (docs/theory/rotation.md); for psi_x, half the angle of one of its rotations. It is 0 for a non-finite state
             and for an event, and NaN without failure or event.
-        warnings: Bits of Warnings, shape (n,). Warnings about the motion need checks="all", which checks it every 128
-            steps and at the end.
+        warnings: Warnings of each member, as bits of lw.Warnings, shape (n,). Warnings about the motion need
+            checks="all", which checks the motion every 128 steps and at the end.
         warning_time: Time at which each member's most serious warning was first seen [s], shape (n,); 0 for a warning
             about its start, NaN without a warning.
         warning_value: The value that caused the warning at that time, shape (n,); NaN without a warning.

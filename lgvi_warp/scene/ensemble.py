@@ -545,7 +545,7 @@ class Ensemble(Summarized, Documented):
         return ensemble
 
     def in_scene(self, scene: SceneLike, by_member: Sequence[str] = ()) -> Ensemble:
-        """Return the same members, in a scene with other terms, events or parts of the controller.
+        """Return the same members in another scene, with other terms, events or parts of the controller.
 
         Args:
             scene: The scene. Varied numbers must keep their names, or not exist in it.

@@ -63,7 +63,7 @@ def from_sdf(
         center_of_buoyancy: Position (3,) [m] in the main link's axes (z up), instead of the centre of the shapes.
         gravity: Acceleration of free fall [m/s2]; by default that of the world, or 9.80665 if there is no world.
         include: {name: SDF file}, each file as path or text, to replace <include> elements. The name is the element's <name>,
-            its <uri> or the last part of this. By default none; a file named inside `source` is never opened.
+            its <uri> or the last part of its <uri>. By default none; a file named inside `source` is never opened.
 
     Returns:
         The tables "vehicle", "environment" and "terms" of a scene file. Without a shape the vehicle is neutral.

@@ -489,7 +489,7 @@ class Term(Documented):
 
         By default this is the energy, if the device code is POTENTIAL and has no other role, and `potential` is defined and
         does not depend on time. Any other law conserves nothing by default. A law whose potential depends only on depth and
-        on the attitude relative to the vertical conserves all three quantities, and must override this property.
+        on the attitude relative to the vertical conserves all three quantities; its author should override this property.
         """
         device = self.device
         follows = getattr(device, "POTENTIAL", False) and type(self).potential is not Term.potential

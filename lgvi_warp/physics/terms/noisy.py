@@ -50,7 +50,8 @@ class NoisyTerm(Term):
     """Base class of terms with random numbers, which follow from seed, member, the term's name and the number of the draw.
 
     The author's device code must set NOISE = True, and gets the numbers of a step by `normals_over(view, p.key, stream)`.
-    This class adds the field `key` to the device struct; an own `packed` must add it by `noise_key`.
+    This class adds the field `key` to the device struct. A subclass that defines `packed` must add its value by `noise_key`,
+    and device code that has its own `params` must declare it.
 
     Args:
         noise_step: Time from one draw to the next [s]. The step of a run must be a whole multiple of it; all such runs have

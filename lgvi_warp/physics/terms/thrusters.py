@@ -60,11 +60,11 @@ class Thrusters(Commanded):
         table_commands: Commands of a table of thrust, (t,) [unit], rising; instead of polynomials. None by default.
         table_thrusts: Thrusts at these commands, (t, n) [N], or (t,) for n equal thrusters, linear between the commands and
             constant outside. They must rise and be 0 at the command 0; near this command several may be 0.
-        advance_loss: Loss of thrust c_u ahead, (n,) [N per unit and m/s]; by default no loss.
-        advance_loss_astern: Loss of thrust c_u astern, (n,) [N per unit and m/s]; by default the loss ahead.
+        advance_loss: Coefficient of the loss of thrust ahead, (n,) [N per unit and m/s]; by default no loss.
+        advance_loss_astern: The same coefficient astern, (n,) [N per unit and m/s]; by default the coefficient ahead.
         torque_coefficient: Torque on the vehicle about the direction per unit of w |w|, (n,) [N m per unit^2]. Its sign
             depends on the propeller's sense of rotation. None by default.
-        torque_loss: Loss of torque, (n,) [N m per unit and m/s], with the sign of the torque; 0 by default.
+        torque_loss: Coefficient of the loss of torque, (n,) [N m per unit and m/s], with the sign of the torque; 0 by default.
         power_commands: Commands of a table of power, (s,) [unit], rising; these are values of w, as in the table of thrust.
             By default `table_commands`.
         power: Electrical power at these commands, (s, n) [W], or (s,) for n equal thrusters, linear between the commands and

@@ -35,7 +35,7 @@ class DensityProfile(Term):
 
     The hull's buoyancy is B rho(d) / rho0 (1 - compressibility (d - d0)). B is the vehicle's buoyancy, rho0 the water
     density of the environment, and d the depth of the centre of buoyancy. `ballast` and `buoyancy_engine` displace water
-    of the density rho(d), and their pumps work against its weight. Drag and added mass use rho0.
+    of the density rho(d), and their pumps work against the pressure of this water. Drag and added mass use rho0.
 
     Args:
         depths: Depths, (k,) [m], rising.
@@ -155,7 +155,7 @@ class DensityProfile(Term):
 
         Args:
             numbers: The term's numbers by field, each of shape (n, ...).
-            reference: rho0, (n,) [kg/m3].
+            reference: Density rho0 of the environment, (n,) [kg/m3].
 
         Returns:
             The rows (n, rows), and the number of knots after the first.
@@ -174,7 +174,7 @@ class DensityProfile(Term):
 
         Args:
             numbers: The term's numbers by field, each of shape (n, ...).
-            reference: rho0, (n,) [kg/m3].
+            reference: Density rho0 of the environment, (n,) [kg/m3].
             depth: Depths (k, n) [m].
 
         Returns:

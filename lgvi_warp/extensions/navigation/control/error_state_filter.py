@@ -64,16 +64,16 @@ class ErrorStateFilter(MeasuringPart):
 
     Args:
         imu: Key of an `IMU`; "imu" by default.
-        dvl: Key of a `DVL`; "", the default, for none. The following keys are "" by default, too.
+        dvl: Key of a `DVL`; "", the default, for none. The next four keys are "" by default, too.
         depth: Key of a `Sensor` of "depth".
         heading: Key of a `Sensor` of "heading".
         fix: Key of a `Sensor` of "position" without latency, such as GPS with `deepest`.
         delayed_fix: Key of a `Sensor` of "position" whose `latency` is below 8 times its `every`, such as USBL. If a
             member's numbers give more pending fixes than the scene's numbers, the filter ignores the excess.
-        position_sigma: Standard deviation of the first position (3,) [m], inertial axes, or one number for all axes; 1 by
-            default.
-        velocity_sigma: Standard deviation of the first velocity (3,) [m/s], inertial axes; 0.1 by default.
-        attitude_sigma: Standard deviation of the first attitude (3,) [rad], body axes; 0.02 by default.
+        position_sigma: Standard deviation of the first position error (3,) [m], inertial axes, or one number for all axes; 1
+            by default.
+        velocity_sigma: Standard deviation of the first velocity error (3,) [m/s], inertial axes; 0.1 by default.
+        attitude_sigma: Standard deviation of the first attitude error (3,) [rad], body axes; 0.02 by default.
         accelerometer_sigma: Standard deviation of the accelerometers' bias (3,) [m/s^2], whose first estimate is 0; 0.02 by
             default.
         gyroscope_sigma: Standard deviation of the gyroscopes' bias (3,) [rad/s], whose first estimate is 0; 1e-3 by default.

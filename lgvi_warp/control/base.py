@@ -477,8 +477,8 @@ class IntegralLaw(ControlLaw):
     """Base class of laws with integrals; each integral has two rows of the memory.
 
     Args:
-        anti_windup: "conditional", the default: an integrator stops while the actuators do not deliver the demand and its
-            error would increase the shortfall; or "none".
+        anti_windup: "conditional", the default, stops an integrator while the actuators do not deliver the whole demand
+            and the integrator's error would increase the missing part. "none" never stops an integrator.
     """
 
     # Rows of the memory, two of each integral's number; and what the device code calls several limits of integrals.

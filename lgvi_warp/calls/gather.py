@@ -32,18 +32,18 @@ def gather(result: Result | str | os.PathLike[str], statistics: Sequence[Any], w
     same order. If a store holds rounded samples (Store(dtype="float32") of a run in float64), the rounded samples are
     used. The estimates are given at the times of the samples.
 
-    Metrics need samples at every tick of the controller, with the signals that they read: save=lw.SaveAt(every=period,
-    fields=...). Such metrics differ from metrics gathered during the run by round-off, because a run converts ticks to
-    the user's axes in its kernel. Statistics of outcomes and end times need no samples.
+    Metrics need a sample at each tick of the controller, with the signals that they read: save=lw.SaveAt(every=period,
+    fields=...). They differ by round-off from metrics gathered during the run, since a run converts the values at ticks
+    to the user's axes in its kernel. Statistics of outcomes and end times need no samples.
 
     Args:
         result: A result of `lw.solve`, `lw.open_run` or `lw.Result.load`, or the path of a store. From a store, the
             samples of only a few blocks are in memory at a time.
         statistics: Statistics, as in `lw.solve`, or their tables from a scene file.
-        weights: Weights of the members (n,), at least 0, in any unit (importance sampling). With weights the members
-            represent another distribution than the one from which they were drawn. Default: the weights of the run (see
-            lw.designs.Table), or equal weights. With weights, the members of a Sobol sequence or another design are
-            treated as independent, so their intervals are wide.
+        weights: Weights of the members for importance sampling (n,), at least 0; only their ratios count. With weights
+            the members represent another distribution than the one from which they were drawn. By default the weights
+            of the run are used (see lw.designs.Table), or equal weights if it has none. With weights, the members of a
+            Sobol sequence or another design are treated as independent; the confidence intervals are therefore wide.
 
     Returns:
         The estimates by name. Their `messages` are notes and warnings for the user.

@@ -26,20 +26,20 @@ from lgvi_warp.store.run import disk_error_with_remedy
 def merge(paths: Sequence[str | os.PathLike[str]], out: str | os.PathLike[str], overwrite: bool = False) -> Folder:
     """Merge stores that hold blocks of one run (`run --blocks`) into a new store.
 
-    Every file is compared with its checksum while it is copied. If all blocks are there, the members whose samples the
-    run keeps (keep="failed" or indices) are run again here, as `resume` does. On another machine, or if a scene file
-    cannot describe the ensemble, they are not run here: the store is complete only after `lw.resume(path, fleet)`.
+    Every file is compared with its checksum while it is copied. If no block is missing, the members that the run's
+    `keep` selects ("failed" or indices) run again to obtain their samples. This step is skipped on a machine other than
+    the run's, or if a scene file cannot describe the ensemble: then `lw.resume(path, fleet)` must complete the store.
 
     Args:
-        paths: Stores, or folders with one store each.
-        out: The new store, or the folder for it.
+        paths: Paths of the stores, or of folders with one store each.
+        out: Path of the new store, ending in .zarr, or of the folder in which to create it.
         overwrite: Whether to replace an existing run at `out`; default False.
 
     Returns:
-        The new store, complete or not.
+        The new store, which may be incomplete.
 
     Raises:
-        SceneError: If the stores are not of one run, or damaged.
+        SceneError: If the stores belong to different runs, or a store is damaged.
         OSError: If the disk cannot be written.
 
     Examples:

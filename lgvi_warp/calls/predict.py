@@ -122,16 +122,16 @@ def _share(wanted: int, available: int | None, of: str) -> str:
 def predict(
     fleet: Ensemble | Scene, *, threads: int | None = None, store: Store | str | None = None, **settings: Any
 ) -> Prediction:
-    """Predict time, memory and disk space of lw.solve(fleet, **settings) from a trial of about a second.
+    """Predict time, memory and disk space of lw.solve(fleet, **settings) from a trial run of about one second.
 
-    The prediction includes statistics, and the second run of the members in keep=[...]. It excludes the second run of
-    keep="failed", since the number of failures is not known. With `until`, the prediction is for the whole ensemble. If
+    The prediction includes statistics, and the second run of the members that keep=[...] lists. It excludes the second
+    run with keep="failed", since the number of failures is not known. With `until`, all members are assumed to run. If
     the cost of a step changes during the run (events, adaptive steps), the time of the run differs from the prediction.
 
     Args:
-        fleet: An Ensemble, or a Scene, which stands for its own ensemble.
-        threads: Number of threads; default as in `lw.solve`.
-        store: As for `lw.solve`; free space is read from the disk of its folder. Default None: a run in memory.
+        fleet: An Ensemble, or a Scene, whose [ensemble] is then used.
+        threads: Number of threads; by default as in `lw.solve`.
+        store: As in `lw.solve`; free space is read from the disk of its folder. None, the default, is a run in memory.
         **settings: Arguments of `lw.solve` that determine the plan and the saved data: method, h, t1, save, dtype,
             width, checks, on_failure, statistics, keep, until.
 

@@ -41,24 +41,24 @@ class FailedMembers(SceneError):  # noqa: N818  (what happened, and no fault of 
 
 
 class Prepared:
-    """A run made by `prepare` that can be called many times. By default row i of X has the noise of member i.
+    """A run made by `prepare` that can be called many times. By default row i of the input X has the noise of member i.
 
     Args:
-        fleet: members of a call without X.
-        table: members whose columns a call with X replaces; or a text that says why no call can have an X.
+        fleet: members that a call without X runs.
+        table: ensemble whose columns a call with X replaces; or the reason, as text, why calls cannot take X.
         names: names of the columns of X.
         of: quantities of interest; empty if calls return whole results.
         runner: object that prepares and runs the calls.
-        levels: if X holds levels, the columns of the unit cube in the order of the names; None if X holds values.
+        levels: column of the unit cube for each name, if X holds levels; None if X holds values.
         refuse: whether a failed member is an error; otherwise its quantities are NaN.
         common_noise: whether all members have the same noise.
-        noise: the noise of the calls, and its source.
-        made_of: arguments of `prepare`, by position and by name, for a pickle.
+        noise: layout of the random draws of a call, and their source.
+        made_of: arguments of `prepare`, by position and by name, from which a pickled run is prepared again.
 
     Attributes:
         names: names of the columns of X (d,).
         common_noise: whether all members have the same noise.
-        noise: the noise of the calls, and its source.
+        noise: layout of the random draws of a call, and their source.
         draws: random draws of forces and sensors in a call.
 
     Methods:
@@ -85,7 +85,7 @@ class Prepared:
 
     @property
     def draws(self) -> tuple[NoiseDraws, ...]:
-        """Standard normal draws of forces and sensors in a call, in the order of the columns of xi; empty without noise."""
+        """Streams of the standard normal draws in a call, in the order of the columns of xi; empty without noise."""
         return self.noise.layout.draws
 
     @shows_progress
@@ -99,10 +99,10 @@ class Prepared:
         indices: Any = None,
         progress: Callable[[float], None] | bool | None = None,
     ) -> Any:
-        """Run members with the numbers of X from t = 0. By default row i has the noise of member i in every call.
+        """Run members with the numbers of X from t = 0. By default row i of X has the noise of member i in every call.
 
-        Some algorithms follow rows from call to call (Markov chains, subset simulation, optimisers). With noise, they
-        must select the noise of each row: new `indices` or another `seed` give new noise, the same values give the same
+        Some algorithms keep or move rows between calls (Markov chains, subset simulation, optimisers). With noise, they
+        must select the noise of each row. The same `indices` and `seed` give the same noise; other values give other
         noise.
 
         X: (n, d), columns in the order of `names`; or columns by name, in any order: a mapping, a data frame, a
@@ -142,29 +142,29 @@ class Prepared:
     ) -> Any:
         """Run members from given states, or continue from the end of another run, for the duration of the prepared run.
 
-        By default row i has the noise of member i in every call. A run that is continued continues its noise too. Calls
-        that continue one another from `result.final`, with its numbers, give together the same bits as one long run.
+        By default row i of the states has the noise of member i in every call. A run that is continued continues its
+        noise, too. Calls that each continue the previous `result.final` give together the same bits as one long run.
 
         Args:
-            position: (n, 3) [m], inertial axes; or `result.final` of another run, in place of all four arrays.
+            position: (n, 3) [m], inertial axes; or `result.final` of another run, which replaces all four arrays.
             attitude: (n, 3, 3), body to inertial axes.
             velocity: (n, 3) [m/s], body axes.
             angular_velocity: (n, 3) [rad/s], body axes.
-            parameters: arrays (n, ...) by name, as in `Ensemble.from_states`; default None: the numbers of the scene,
-                or of `result.final`.
-            xi: standard normals, as in a call of the run.
+            parameters: arrays (n, ...) by name, as in `Ensemble.from_states`. None, the default, uses the numbers of
+                the scene, or of `result.final`.
+            xi: standard normal numbers, as in a call of the run.
             indices: (n,), whole numbers from 0 that select the noise of each member, such as its index in another
-                ensemble; members with the same index have the same noise. Default None for 0 to n - 1, or those of
+                ensemble; members with the same index have the same noise. By default 0 to n - 1, or the indices of
                 `result.final`.
-            seed: the seed of the noise, a whole number from 0. Default None for 0, or the seed of `result.final`.
-            t0: time of the states [s], a whole number of steps. Waves, schedules and noise start at this time. Default
-                None for 0, or the time of `result.final`. Sample times of the prepared run count from t0.
+            seed: the seed of the noise, a whole number from 0; by default 0, or the seed of `result.final`.
+            t0: time of the states [s], a whole number of steps. Waves, schedules and noise start at this time; by
+                default 0, or the time of `result.final`. Sample times of the prepared run count from t0.
 
         Returns:
             The quantities, or a `Result`, as from a call of the run.
 
         Raises:
-            SceneError: if an array has a wrong shape or unphysical values, or the seed is no whole number. States that
+            SceneError: if an array has a wrong shape or unphysical values, or the seed is not a whole number. States that
                 are not finite raise no error: their members fail.
             FailedMembers: if members failed, unless failed="nan".
         """
@@ -248,7 +248,7 @@ class Prepared:
             (n, d), columns in the order of the names.
 
         Raises:
-            SceneError: if a label is missing, unknown or doubled, or an entry is not a real number.
+            SceneError: if a label is missing, unknown or given twice, or an entry is not a real number.
         """
         faults, names = Faults(), self.names
         shape = f"give an array of shape (n, {len(names)}), columns {', '.join(names)}"
@@ -344,50 +344,50 @@ def prepare(
     executor: Any = "threads",
     scheduler: str | None = None,
 ) -> Prepared:
-    """Prepare a run that is called many times with different numbers. Row i always has the noise of member i.
+    """Prepare a run that is called many times with different numbers X. By default row i of X has the noise of member i.
 
-    Checks, choices, compilation and everything that does not depend on `vary` are done once. A call then costs little
-    more than the kernel, and its results are bit-identical to `solve`. The function can be pickled and called from
+    Checks, compilation and everything else that does not depend on `vary` are done once. A call then takes little longer
+    than its kernel, and its results are bit-identical to those of `solve`. The function can be pickled and called from
     threads.
 
-    Noise of forces and sensors is frozen: in every call row i has the noise that `solve` gives to member i with the
-    ensemble's seed. A method that follows rows from call to call, such as a Markov chain, calls run(X, seed=,
-    indices=).
+    Noise of forces and sensors is frozen: in every call row i of X has the noise that `solve` gives to member i with
+    the ensemble's seed. Algorithms that move rows between calls, such as Markov chains, select the noise of each row by
+    run(X, seed=..., indices=...).
 
         run = lw.prepare(scene, ["vehicle.mass", "start.position[2]"], of="max(depth)", h=0.01, t1=60.0)
         depths = run(X)                                    # X (n, 2), depths (n,)
 
     Args:
-        fleet: A Scene or an Ensemble. If `vary` is None, its [ensemble] names the numbers that vary.
+        fleet: A Scene or an Ensemble. If `vary` is None, the ensemble (for a Scene its [ensemble]) names what varies.
         vary: Names of the numbers that vary, ["vehicle.mass", "start.position[2]"], or a mapping of names to
             distributions.
         of: One or several quantities of interest: "position[2]", "max(depth)", a Quantity, a function of a Result,
-            "outcome floor", or a metric as in `lw.sweep` ("iae depth", lw.metrics.ITAE("depth")). Default None: calls
-            return results.
-        method: As in `lw.solve`; default: chosen once, for `fleet`. If h, t1, dtype, width, checks, on_failure, device,
-            threads, executor or scheduler are omitted, they are taken from the scene's [run].
+            "outcome floor", or a metric as in `lw.sweep` ("iae depth", lw.metrics.ITAE("depth")). None, the
+            default: calls return whole results.
+        method: As in `lw.solve`; by default it is chosen once, for `fleet`. Also h, t1, dtype, width, checks, on_failure,
+            device, threads, executor and scheduler are taken from the scene's [run] if they are omitted.
         h: Step [s].
         t1: End of the run [s].
-        save: Samples to keep, as in `lw.solve`. Default with `of`: the samples that the quantities need.
+        save: Samples to keep, as in `lw.solve`. With `of`, by default the samples that the quantities need.
         dtype: "float64", "float32" or "float32_compensated".
-        statistics: Statistics gathered over the members of each call, in result.statistics; default none.
-        levels: Whether X holds levels in (0, 1), which the distributions convert to values, instead of values. Joint
-            distributions need levels. Default False.
-        failed: "refuse" (default): an error if members fail; "nan": their quantities are NaN. It acts with `of` only.
-        common_noise: Whether all members have the same noise of forces. Default False.
-        draws: "drawn" (default): counters draw the noise of forces and sensors. "given": each call passes standard
-            normals, run(X, xi), with the columns that `draws` of the run lists.
-        threads: Number of threads; default all cores, one for a short run of few members (fewer than 2,000, and less
-            than a million steps of vehicles).
-        width: Vehicles per packet; default from the CPU.
-        checks: "safe", "all" or "none".
-        on_failure: "freeze", "raise" or "substep".
-        device: "cpu", the only one.
+        statistics: Statistics gathered over the members of each call, in result.statistics; by default none.
+        levels: Whether X holds probability levels in (0, 1), which the distributions convert to values. False, the
+            default: X holds the values themselves. Joint distributions need levels.
+        failed: "refuse", the default, raises an error if members fail; "nan" sets their quantities to NaN. Only with `of`.
+        common_noise: Whether all members have the same noise of forces and sensors; False by default.
+        draws: "drawn", the default: the run draws the noise of forces and sensors from the seed. "given": each call passes
+            standard normal numbers, run(X, xi); the attribute `draws` of the prepared run lists the columns of xi.
+        threads: Number of threads; by default one per core. A short run has one thread by default (fewer than 2,000
+            members, and fewer than a million steps summed over the members).
+        width: Number of vehicles in a packet; by default chosen for the CPU.
+        checks: "safe", "all" or "none", as in `lw.solve`.
+        on_failure: "freeze", "raise" or "substep", as in `lw.solve`.
+        device: "cpu", the only device.
         executor: "threads" (default), "processes" or "dask", or an object that runs blocks.
         scheduler: Address of Dask's scheduler.
 
     Returns:
-        The function, a `Prepared`; its `names` are the columns of X.
+        The function, a `Prepared`; its `names` name the columns of X.
 
     Raises:
         SceneError: If arguments are at fault; the message names every fault.

@@ -39,13 +39,13 @@ def resume(
 
     Args:
         path: A store, or a folder with one store.
-        fleet: The run's Ensemble, or Scene. Needed if a scene file cannot describe it (user-defined distributions).
+        fleet: The run's Ensemble, or Scene. Needed if a scene file cannot describe it, as with user-defined distributions.
         executor: "threads" (default), "processes" or "dask", or an object that runs blocks.
-        threads: Number of threads; default as in `lw.solve`.
+        threads: Number of threads; by default as in `lw.solve`.
         scheduler: Address of Dask's scheduler.
         progress: As in `lw.solve`.
-        force: Whether to resume on another machine or with other versions, which may change the bits.
-        keepers: The keepers that were passed to the run.
+        force: Whether to resume on another machine or with other software versions, which may change the bits.
+        keepers: The keepers (objects that store a run's data, internal) that were passed to the run.
         statistics: The statistics that were passed to the run. Needed if one uses a function, which a store cannot save.
 
     Returns:

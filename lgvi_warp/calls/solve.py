@@ -54,37 +54,37 @@ def solve(
 ) -> Result:
     """Advance every member of the fleet from t = 0, or from `start`, to t1 and return the requested samples and statistics.
 
-    Omitted arguments are taken from the scene's [run] section; the defaults below apply if it has no value. Nothing is
-    printed unless `progress` is True. On one type of machine the same inputs give the same bits for any number of
-    threads.
+    An omitted argument is taken from the scene's [run] section; if it is not set there, the default below applies.
+    Nothing is printed unless `progress` is True. On one type of machine the same inputs give the same bits for any
+    number of threads.
 
     Args:
-        fleet: An Ensemble, or a Scene, which stands for its own ensemble (one vehicle if it has none).
-        method: A name or a Method. Default: chosen by the scene's forces, "psi_s" without damping.
+        fleet: An Ensemble, or a Scene, whose [ensemble] is then run (one vehicle if the scene has none).
+        method: A name or a Method. By default chosen from the scene's forces; "psi_s" for a scene without damping.
         h: Step [s].
         t1: End of the run [s], counted from t = 0.
-        save: Fields and times to save. Default: the interval `save_every` of the scene's [run], else start and end
-            only.
+        save: Fields and times to save. By default one sample per interval `save_every` of the scene's [run], or, if this
+            is not set, the start and the end only.
         dtype: "float64" (default), "float32", or "float32_compensated", which stores each number of the state as the
             sum of two float32 (for many short steps, or positions far from the origin).
-        threads: Number of threads; default all cores, one for a short run of few members (fewer than 2,000, and less
-            than a million steps of vehicles).
-        width: Vehicles per packet; default from the CPU.
+        threads: Number of threads; by default one per core. A short run has one thread by default (fewer than 2,000
+            members, and fewer than a million steps summed over the members).
+        width: Number of vehicles in a packet; by default chosen for the CPU.
         checks: "safe" (default) gives each member a status, freezes failed members, and warns if parameters or start do
-            not suit the step. "all" also warns of problems during the run. "none" compiles no checks.
+            not suit the step. "all" also warns of problems during the run. "none" compiles the kernel without checks.
         on_failure: "freeze" (default) keeps a failed member at its last good state. "raise" raises MembersFailed after
-            the run. "substep" repeats a step that has no solution in 2, 4, ... 1024 parts, for that member alone. The
-            order and the symmetry of each step are kept, symplecticity is not.
-        device: "cpu" (default): runs are on CPU cores. Any other device, such as "cuda", is refused.
+            the run. "substep" repeats a step whose equation has no solution, for that member alone, as 2, 4, ... 1024
+            shorter steps. Order and symmetry of the method are kept, but not symplecticity.
+        device: "cpu", the default, runs on the CPU cores. Any other device, such as "cuda", is refused.
         progress: True shows a bar on a terminal and in a notebook, and lines elsewhere, on stderr. A function is called
-            with the finished fraction of the work, in [0, 1], from the working threads. Default: nothing is shown.
+            with the finished fraction of the work, in [0, 1], from the working threads. By default nothing is shown.
         statistics: Statistics gathered over the members at every sample time during the run, such as
             lw.statistics.Mean("position"). The estimates are in result.statistics. An empty sequence gathers no
             statistics, even if the scene names some.
         keep: Members whose samples are kept. "all" (default) keeps every member. With "none", memory does not grow with
             members or steps. "failed" or indices of members: these members run again after the run, with the same bits,
-            and their samples are in result.kept. Members that an event stopped are not failed.
-        until: lw.Until(...) ends the run before the last member, once the interval of a statistic is narrow enough.
+            and their samples are in result.kept. A member that an event stopped has not failed.
+        until: lw.Until(...) ends the run before all members have run, once the interval of a statistic is narrow enough.
             False runs all members, even if the scene has such a rule.
         store: A folder "runs/x/run.zarr", or a Store with more settings. Samples are written there block by block and
             are not held in memory. lw.resume completes the run if it is interrupted.
@@ -93,13 +93,13 @@ def solve(
         blocks: With a store, the blocks to run, such as range(0, 100), for a run in parts. The range may go beyond the
             last block. The result has the members of these blocks.
         on_block: Function to monitor a run. It is called with a copy of each block's Result as soon as the block is
-            finished, in order and in the calling thread. Default: none.
+            finished, in the order of the blocks and in the calling thread. By default there is none.
         start: `result.final` of another run of these members, to continue it. With the same settings and numbers, the
-            two runs give the same bits as one. Samples, statistics and messages are of this run alone. Default: from t
-            = 0.
+            two runs give the same bits as one long run. Samples, statistics and messages are those of the new run only.
+            By default the members start at t = 0.
         tangents: Name or names of numbers, such as "vehicle.mass" or "start.velocity[0]". The derivatives of all
-            samples with respect to these numbers are in result.jacobian. The kernel integrates the derivatives with the
-            motion, two per run; each derivative costs one to two runs without derivatives. Default: none.
+            samples with respect to these numbers are in result.jacobian. The kernel integrates two derivatives at a
+            time with the motion. Each derivative takes the time of one to two runs without derivatives. Default: none.
 
     Returns:
         A Result, with every member unless `until` or `blocks` selects fewer.

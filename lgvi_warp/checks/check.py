@@ -59,34 +59,37 @@ def check_law(
 ) -> LawReport:
     """Check a term's device code against its host code, at random states.
 
-    Each new law costs the compilation of one small kernel. These properties are checked for the roles that the law has:
+    Each new law costs the compilation of one small kernel. A role is a device function of the law, such as `push`; all
+    roles are explained in docs/develop/add_a_force.md. These properties are checked for the roles that the law has:
 
     * All roles: numbers are finite, also at rest and along single axes. Lanes are independent, and the position of a
       member in a packet has no effect. Without noise and memory, forces do not depend on the length of the step.
       Numbers that vary by member have the same effect as shared numbers. `packed` fills the fields that `params` names.
       The law is the same in all body axes and about all origins that a method may choose.
-    * `law`: independent of velocities, and of the time unless `timed`. With POTENTIAL, force and torque are the
-      derivatives of `potential`, and `energy` adds the same potential.
-    * `damping`: nu . D nu >= 0. With `dissipative = False` the smallest power is reported and is not a fault.
-    * `push`: the force and torque of `damping`, or of `load`.
-    * `load`: as `damping`, in artificial water that varies everywhere.
-    * `follow`: the stored memory depends on the time alone; two parts of an interval give the same as the whole
-      interval.
-    * `carried_inertia`: symmetric; it and `carried_momentum` do not depend on velocities.
-    * `distance`: the same in all body axes.
-    * `power`: the same in all body axes and about all origins.
-    * `flow`: rate and gradient are derivatives of the velocity, `water` gives the same velocity, and FLOW describes it.
+    * `law` does not depend on velocities, nor on the time unless `timed` is True. With POTENTIAL, force and torque are
+      the derivatives of `potential`, and `energy` adds the same potential.
+    * `damping`: nu . D nu >= 0 for its matrix D and every velocity nu. With `dissipative = False` the smallest power is
+      reported, but a negative power is not a fault.
+    * `push`, which Runge-Kutta methods use, adds the same force and torque as `damping` or `load`.
+    * `load`, damping of a hull that reads the water velocity along itself, passes the checks of `damping` in test water
+      that varies in space and time.
+    * `follow`: the stored memory depends on the time alone, and is the same after two parts of an interval as after the
+      whole interval.
+    * `carried_inertia` is symmetric. Neither `carried_inertia` nor `carried_momentum` depends on velocities.
+    * `distance` and `power` are the same in all body axes, and `power` about all origins.
+    * `flow`: rate and gradient are derivatives of the velocity. `water` gives the same velocity. The constant FLOW
+      ("steady", "uniform" or "varying") covers the observed variation of the velocity.
 
     Args:
         term: the term, built-in or the user's own.
         scene: scene with the vehicle and the environment to use; None (default) for a simple vehicle.
-        samples: number of random states, called views (default 64): any attitude, positions some metres around the
+        samples: number of random states (default 64): any attitude, positions some metres around the
             scene's start, velocities [m/s] and angular velocities [rad/s] of order 1, times from 0 to 10 s.
-        seed: seed of the random views (default 0).
+        seed: seed of the random states (default 0).
         step: step of the finite differences [m, rad, s] (default 1e-5).
 
     Returns:
-        A report of all checks; `ok` says whether all passed.
+        A report of all checks; `ok` is True if all passed.
 
     Raises:
         SceneError: if `term` is not a term, or its device code is incomplete, has a wrong signature or does not

@@ -97,34 +97,34 @@ class TwinReference:
 def check_controller(
     part: Part, *, scene: Scene | None = None, twin: Any = None, samples: int = 64, seed: int = 0
 ) -> LawReport:
-    """Check the device code of a part of a controller at random ticks, four in a row for each member.
+    """Check the device code of a part of a controller at random states of the motion, over four ticks for each member.
 
-    Each new part costs the compilation of two small kernels. The checks:
+    Each new part costs the compilation of two small kernels. These properties are checked:
 
     * `packed` fills the fields that `params` names, and gives the same result in all axes that a method may choose.
-    * Numbers are finite at random ticks, without a control error, with an error of half a turn, at rest, and with each
+    * Numbers are finite at random states, without a control error, with an error of half a turn, at rest, and with each
       number of the part at its bounds.
     * Lanes are independent: the output of a lane does not depend on the others, and equals that of a packet of one vehicle.
     * Numbers that vary by member have the same effect as shared numbers.
     * The part writes only its own rows of the memory. Only allocation and faults write commands.
     * The part uses measurements alone: nothing depends on the true position.
-    * The output equals that of the twin, if given, at every tick.
+    * With `twin`, the output equals that of the twin at every tick.
 
-    The last line of the report is the processor time for a vehicle and a tick.
+    The last line of the report is the processor time per vehicle and tick.
 
     Args:
-        part: a sensor, a guidance, a law, an allocation or a fault, built-in or the user's own.
+        part: a sensor, a guidance, a law, an allocation or a fault, built-in or written by the user.
         scene: scene with the vehicle, the actuators and, if the part needs other parts, a controller. The part is added to
-            it, or replaces the part of the same name. None (default) for a simple vehicle with a `lw.terms.ControlWrench`.
+            this controller, or replaces its part of the same name. None (default) for a simple vehicle with a
+            `lw.terms.ControlWrench`.
         twin: an object with the same role for one vehicle in NumPy, as the parts in `lgvi_warp/reference/control`: some
-            of `begin()`, `measure(y)`, `guide(r, y)`, `control(w, r, y, unmet)`, `allocate(w, actuators)`. Default
-            None: no twin.
+            of `begin()`, `measure(y)`, `guide(r, y)`, `control(w, r, y, unmet)`, `allocate(w, actuators)`. Default None.
         samples: number of members (default 64), of four ticks each: any attitudes, positions some metres around the
             scene's start, velocities, angular velocities and demands of order 1.
-        seed: seed of the random ticks (default 0).
+        seed: seed of the random states (default 0).
 
     Returns:
-        A report of all checks; `ok` says whether all passed.
+        A report of all checks; `ok` is True if all passed.
 
     Raises:
         SceneError: if `part` is not a part or does not fit the scene, or its device code is incomplete, has a wrong

@@ -17,24 +17,24 @@ from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Altimeter(Sensor):
-    """A sensor of the range to the scene's floor along a beam of the body, with the errors of any `Sensor`.
+    """A sensor of the range to the scene's floor along a beam fixed to the body, with the same errors as a `Sensor`.
 
-    A reading is 0 on the floor or below it, and `most` if no floor is within range. It is computed from the true
+    A reading is 0 on the floor or below it, and `most` if no floor is within range. Readings are computed from the true
     position and attitude, not from the readings of other sensors.
 
     Args:
         direction: Direction of the beam in body axes, (3,) of any length; (0, 0, 1) by default, down.
         point: Point at which the beam begins, (3,) [m] in body axes; zeros by default.
         most: Largest range of the beam [m]; 100 by default.
-        floor: Name of the floor; "" by default, for the only one of the scene.
+        floor: Name of the floor; "", the default, stands for the only floor of the scene.
         noise: Standard deviation of each reading [m]; 0 by default.
         bias: Constant error added to each reading [m]; 0 by default.
         drift: Standard deviation of the random walk after 1 s [m / s^1/2]; 0 by default.
         quantum: Readings are rounded to whole multiples of this length [m]; 0 by default, for no rounding.
-        every: Ticks from one new reading to the next, a whole number; 1 by default.
-        latency: Ticks until a reading arrives, a whole number; 0 by default.
+        every: Number of ticks from one new reading to the next, a whole number; 1 by default.
+        latency: Number of ticks after which a reading arrives, a whole number; 0 by default.
         dropout: Probability that a reading is lost, so that the last reading is kept; 0 by default.
-        burst: Mean length of a run of lost readings [ticks]; by default losses are independent.
+        burst: Mean number of ticks in a row without a reading; by default losses are independent.
         outlier: Probability that a reading is an outlier; by default there are no outliers.
         outlier_std: Standard deviation of the error that an outlier adds to the reading [m].
 

@@ -22,24 +22,24 @@ SOURCES = ("altimeter", "chart")
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Altitude(Guidance):
-    """Altitude above the sea floor: the wanted depth, for depth laws, is the floor's depth minus the wanted altitude.
+    """Guidance along the sea floor: the wanted depth, for depth laws, is the floor's depth minus the wanted altitude.
 
     With an altimeter, the floor's depth is the depth of the point that the beam hits. It is computed from the measured
     depth, the measured attitude and the reading. With a beam that points ahead, the vehicle climbs before a slope. Without
-    an echo the vehicle goes deeper until there is one. With the chart, the floor's depth is that of the scene's floor at
-    the measured position. If the floor is shallower at the distance `look_ahead` ahead, its depth there is used.
+    an echo the vehicle goes deeper until the beam has an echo. With the chart, the floor's depth is the smaller of
+    the depths of the scene's floor at the measured position and at the distance `look_ahead` ahead.
 
     Args:
         altitude: Wanted altitude [m], above 0.
         source: "altimeter", the default, or "chart".
-        altimeter: Name of the altimeter; "" by default, for the only one of the controller.
-        floor: Name of the floor of the chart; "" by default, for the only one of the scene.
-        look_ahead: Distance ahead, along the heading, at which the chart is read as well [m]; 0 by default.
+        altimeter: Name of the altimeter; "", the default, stands for the only altimeter of the controller.
+        floor: Name of the floor that serves as chart; "", the default, stands for the only floor of the scene.
+        look_ahead: Distance ahead, along the heading, at which the chart is read in addition [m]; 0 by default.
         shallowest: Least value of the wanted depth [m]; 0 by default.
         deepest: Largest value of the wanted depth [m]; 12,000 by default.
 
     Raises:
-        SceneError: If `shallowest` exceeds `deepest`, `look_ahead` is given without the chart, or a number is
+        SceneError: If `shallowest` exceeds `deepest`, `look_ahead` is given with an altimeter, or a number is
             invalid (see `Term`). A scene refuses this part if its altimeter or floor is missing.
 
     Examples:

@@ -299,7 +299,7 @@ class MeasuringPart(Part):
 
     @property
     def estimates_position(self) -> bool:
-        """Whether the part changes the measured position. The measured minus the true position is the navigation error."""
+        """Whether the part changes the measured position. If so, measured minus true position is the navigation error."""
         return False
 
     @property
@@ -313,7 +313,7 @@ class MeasuringPart(Part):
         return 0
 
     def fault_channels(self, handed: bool) -> int:
-        """Count of numbers that faults can change; by default the size of the reading, 0 for a part without a reading.
+        """Count of numbers that faults can change; by default all numbers of the reading, or 0 for a part without a reading.
 
         Args:
             handed: Whether an estimator takes the part's readings.
@@ -352,13 +352,15 @@ class Guidance(Part):
 
     @property
     def wanted(self) -> tuple[str, ...]:
-        """The quantities of `gives` that the user requested; some law should read each. By default all of `gives`."""
+        """The quantities of `gives` that the user requested, which laws should read; by default all of `gives`."""
         return self.gives
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ControlLaw(Part):
-    """Base class of control laws: the demand X, Y, Z [N] and K, M, N [N m] in body axes, from wanted and measured motion.
+    """Base class of control laws, which compute the demand from the wanted and the measured motion.
+
+    The demand is the force X, Y, Z [N] and the moment K, M, N [N m] in body axes.
 
     Attributes:
         demands: Components that the law demands, among `COMPONENTS`; an empty tuple stands for all of them.
@@ -441,7 +443,7 @@ class ControlLaw(Part):
         return law
 
     def of_vehicle(self, nominal: Numbers) -> Any:
-        """The same law with the numbers of the scene's nominal vehicle, which do not vary by member.
+        """The same law, with access to the numbers of the scene's nominal vehicle, which do not vary by member.
 
         Args:
             nominal: Parameters of vehicle and environment by name, each with its shape in the scene.
@@ -475,8 +477,8 @@ class IntegralLaw(ControlLaw):
     """Base class of laws with integrals; each integral has two rows of the memory.
 
     Args:
-        anti_windup: "conditional", the default: an integrator stops while the actuators do not deliver the demand and its
-            error would increase the shortfall; or "none".
+        anti_windup: "conditional", the default, stops an integrator while the actuators do not deliver the whole demand
+            and the integrator's error would increase the missing part. "none" never stops an integrator.
     """
 
     # Rows of the memory, two of each integral's number; and what the device code calls several limits of integrals.
@@ -561,7 +563,7 @@ class Allocation(Part):
         actuator: The term that takes the commands.
 
     Methods:
-        reach: The wrench of one unit of each command.
+        reach: The wrench of each channel.
     """
 
     section: ClassVar[str] = "allocation"
@@ -585,7 +587,7 @@ class Allocation(Part):
 
         Args:
             faults: Faults of actuators.
-            components: 1 for each of X Y Z K M N that some law demands, else 0, (6,).
+            components: Six numbers for X Y Z K M N: 1 if some law demands the component, otherwise 0.
 
         Returns:
             A copy.
@@ -598,7 +600,7 @@ class Allocation(Part):
 
     @property
     def lost_channels(self) -> tuple[int, ...]:
-        """Indices of the channels that the allocation knows to be lost at some time."""
+        """Indices of the channels that have a known fault, at whatever time it begins."""
         return tuple(sorted({fault.channel for fault in self.losses}))
 
     def steps_of_loss(self, context: PackingContext) -> np.ndarray:

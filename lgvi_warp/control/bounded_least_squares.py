@@ -20,12 +20,12 @@ WORK = 138
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class BoundedLeastSquares(EffortAllocation):
-    """Allocation by bounded least squares: efforts within limits, wrench nearest to the demand (Johansen & Fossen 2013, 2.2).
+    """Allocation by bounded least squares: efforts within limits with the least error (Johansen & Fossen 2013, 2.2).
 
-    The error is the sum of (priority times component)^2, with moments divided by the mean lever arm of the channels. If
-    the unconstrained efforts of least error are within the limits, they are used. They equal the efforts of
-    `PseudoInverse` if the channels can produce every component independently. Otherwise an active-set method finds the
-    efforts of least error, to round-off. Channels that are known to be lost get no effort; any number may be lost.
+    The error is the sum over X, ..., N of (priority times (wrench minus demand))^2, with moments divided by the mean lever
+    arm of the channels. If the efforts of least error without limits are within the limits, they are used. They equal the
+    efforts of `PseudoInverse` if the channels can produce every component independently. Otherwise an active-set method
+    finds the efforts of least error, to round-off. Channels that are known to be lost get no effort, however many these are.
 
     Args:
         to: Key of the term that takes the commands.

@@ -24,15 +24,15 @@ class Callback(ControlLaw):
 
     t is the time of the tick [s]. y is the measured and r the wanted motion, each with arrays of m members (see
     `lw.control.CallbackInput`); `members` are the members' indices (m,). The function may use NumPy, PyTorch, JAX or any
-    solver. Each period costs one launch; docs/controllers/callback.md has the measured cost.
+    solver. Each period costs one kernel launch; docs/controllers/callback.md has the measured cost.
     Calls for one block come in the order of time; different blocks run in different threads.
 
     Args:
         function: The function. It must be picklable if other processes run it.
         to: Key of a term, or a list of keys. The function then returns the commands of all their channels, side by side,
-            (m, channels), and no law or allocation acts on these terms. None, the default: it returns demands.
+            (m, channels), and no law or allocation acts on these terms. None, the default: the function returns demands.
         version: Text or number that identifies the function in sweeps and stores; change it whenever the function changes.
-            None, the default: the function's code identifies it. Give a version if the function reads files or holds
+            With None, the default, its code identifies the function. Give a version if the function reads files or holds
             objects that cannot be compared.
 
     Examples:

@@ -40,7 +40,7 @@ ACTUATOR = 'give the vehicle a term that does, [[terms]] type = "thrusters", "co
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Controller(Documented):
-    """A controller that acts once a period, at each tick; its commands are held until the next tick.
+    """A controller that computes commands once per period, at a tick, and holds them until the next tick.
 
     Each list holds parts such as lw.control.HeadingPID(...), or tables as in a scene file.
 
@@ -124,12 +124,12 @@ class Controller(Documented):
 
     @property
     def parts(self) -> tuple[Part, ...]:
-        """All parts in the user's order, sensors first. The parts of a wired controller have their bus."""
+        """All parts in the user's order, sensors first. Parts of a wired controller know their rows of the memory."""
         return tuple(part for section in SECTIONS for part in getattr(self, section))
 
     @property
     def delay_part(self) -> Delay:
-        """The delay as a part; its key is "controller", that of the section."""
+        """The delay as a part; its key is "controller", like that of the section of the scene file."""
         part = Delay(name=self.key, period=self.period, delay=self.delay)
         object.__setattr__(part, "bus", self.bus)
         return part
@@ -247,7 +247,7 @@ class Controller(Documented):
 
     @property
     def asked(self) -> np.ndarray:
-        """1 for each of X Y Z K M N that some law demands, else 0, (6,)."""
+        """Six numbers for X Y Z K M N: 1 if some law demands the component, otherwise 0."""
         names = {name for law in self.laws for name in law.demands or COMPONENTS}
         return np.array([float(name in names) for name in COMPONENTS])
 
@@ -264,7 +264,7 @@ class Controller(Documented):
 
     @property
     def rejected_rows(self) -> int:
-        """Number of rows, among those of the estimator, that count the readings rejected by its gate."""
+        """Number of rows, among those of the estimator, that count the readings that the estimator's gate rejected."""
         return sum(part.rejected_rows for part in self.sensors)
 
     def _effect(self) -> np.ndarray:
@@ -292,7 +292,7 @@ class Controller(Documented):
         )
 
     def unread(self, terms: Sequence[Term]) -> tuple[tuple[Part, str], ...]:
-        """(guidance, quantity) for each wanted quantity that no law reads, not even as an equivalent quantity.
+        """Pairs (guidance, quantity), one for each wanted quantity that no law reads, nor an equivalent quantity.
 
         A speed that guidance requires is left out if no actuator can produce a forward force and every term gets commands.
 
@@ -328,13 +328,13 @@ class Controller(Documented):
                 faults.add("laws", law.key, fault, "give actuators that can, or leave the law out")
 
     def on(self, bus: Bus) -> Controller:
-        """The same controller with another bus.
+        """The same controller with another bus, the assignment of memory rows to its parts.
 
         Args:
-            bus: Rows of the memory.
+            bus: The new assignment.
 
         Returns:
-            A copy; its parts have this bus as well.
+            A copy; its parts use this bus as well.
         """
         controller = copy.copy(self)
         object.__setattr__(controller, "bus", bus)

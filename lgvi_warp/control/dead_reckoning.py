@@ -18,15 +18,15 @@ DEPTHS = ("reckoned", "measured")
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class DeadReckoning(MeasuringPart):
-    """Dead reckoning: position from measured attitude and velocity, starting at the position of the first tick.
+    """Dead reckoning: integrate the measured velocity, from the measured position at the first tick.
 
-    List it after the sensors that it uses. Without a position sensor it starts at the true position.
+    List it after the sensors that it uses. Without a position sensor, the integration starts at the true position.
 
     Args:
         rule: "trapezoid", the default, integrates the mean of the velocities at the previous and the present tick; "euler"
             integrates the velocity at the previous tick.
-        velocity: Velocity that is integrated: "velocity", the default, over ground; or "water_velocity", through the water,
-            with which the estimate drifts in a current.
+        velocity: "velocity", the default, integrates the velocity over ground. "water_velocity" integrates the velocity
+            through the water, so that the estimate drifts in a current.
         depth: "reckoned", the default, computes the depth from the velocity, like north and east; "measured" uses the
             measured depth.
         start_error: Error added to the position of the first tick, (3,) [m], inertial axes; 0 by default.

@@ -16,7 +16,8 @@ class DepthPID(IntegralLaw):
 
     The wanted pitch is theta_d = -(kp e + ki I), within the pitch limit, where e is the wanted minus the measured depth.
     The sign is negative because pitch up is positive and depth grows downward. The demand is
-    M = kp_pitch (theta_d - theta) + ki_pitch I_theta - kd_pitch q - k_heave w. The law suits vehicles that move forward.
+    M = kp_pitch (theta_d - theta) + ki_pitch I_theta - kd_pitch q - k_heave w, where theta is the measured pitch. The law
+    suits vehicles that move forward.
 
     Args:
         kp: Gain from depth to pitch [rad/m].
@@ -26,10 +27,10 @@ class DepthPID(IntegralLaw):
         ki_pitch: Gain of I_theta, the integral of the pitch error [N m/(rad s)]; 0 by default.
         kd_pitch: Gain of the pitch rate q [N m s/rad]; 0 by default.
         k_heave: Gain of the heave velocity w [N s]; 0 by default.
-        integral_limit: Largest sizes of both integrals, (2,) [m s, rad s]; 1e6 by default.
-        anti_windup: "conditional", the default: an integrator stops while the actuators do not deliver the demand and its
-            error would increase the shortfall; or "none". The depth's integrator also stops while the wanted pitch is at
-            its limit.
+        integral_limit: Largest sizes of I and of I_theta, (2,) [m s, rad s]; 1e6 by default.
+        anti_windup: "conditional", the default, stops an integrator while the actuators do not deliver the whole demand
+            and the integrator's error would increase the missing part, and the depth's integrator also while the
+            wanted pitch is at its limit. "none" never stops an integrator.
 
     Examples:
         >>> import lgvi_warp as lw

@@ -20,12 +20,12 @@ WIDEST = 1.5
 class Docking(Guidance):
     """Approach a dock along its centre line at decreasing speed, and start again if the vehicle is outside the funnel.
 
-    Let e be the distance to starboard of the centre line and D the look-ahead. The wanted heading is the dock's heading
-    minus atan((e + kappa J) / D), with dJ/dt = D e / (D^2 + (e + kappa J)^2) as in the "ilos" of `Waypoints`. The wanted
+    Let e be the vehicle's distance to starboard of the centre line, D the look-ahead and J the integral with
+    dJ/dt = D e / (D^2 + (e + kappa J)^2). The wanted heading is the dock's heading minus atan((e + kappa J) / D). The wanted
     speed over ground falls linearly with the distance, from `speed` at the distance `slowing` to `contact_speed` at the
     dock. The funnel's radius is `mouth` at the dock and grows by tan(`funnel`) per metre of distance. A vehicle that is
-    nearer than `judged` and outside the funnel starts again. It goes to the beginning of the line, which is `approach`
-    before the dock, displaced by `offset` to starboard, and from there along the line. A vehicle that reaches the dock's
+    nearer than `judged` and outside the funnel starts again. It goes to the point that is `approach`
+    before the dock and `offset` to starboard of the line, and from there along the line. A vehicle that reaches the dock's
     plane inside the mouth is docked. Its wanted speed is then 0, and its wanted position and heading are the dock's.
 
     Args:
@@ -39,7 +39,7 @@ class Docking(Guidance):
         funnel: Half the opening angle of the funnel [rad], at most 1.5.
         approach: Distance from the dock at which the line begins [m].
         judged: Distance from the dock within which a vehicle must be in the funnel [m], at most `approach`.
-        offset: Distance to starboard of the line's beginning at which a new approach begins [m]; 0 by default. With an
+        offset: Displacement of the starting point of a new approach to starboard of the line [m]; 0 by default. With an
             offset of twice the turning radius, the vehicle ends its turn on the line.
         kappa: Gain of the integral [m/s]; 0.1 by default.
 

@@ -42,7 +42,7 @@ def _is_channel(value: Any) -> bool:
 class Fault(Sending):
     """A fault of an actuator or of a sensor: between two times it changes the command or the reading x.
 
-    | kind | |
+    | kind | change of the command or reading x |
     | --- | --- |
     | gain | x <- gain x + offset: the actuator is dead at a gain of 0 and weak at a gain below 1 |
     | offset | x <- x + offset |
@@ -50,30 +50,30 @@ class Fault(Sending):
     | freeze | the last command or reading repeats |
     | slow | x follows with a first-order lag, starting from the last command or reading |
     | delay | x arrives later; until the first delayed x arrives, the last command or reading repeats |
-    | intermittent | on and off; while on, a command acts as with "gain", a reading repeats, an estimator gets no reading |
+    | intermittent | on at times: then a command changes as with "gain", a reading repeats, an estimator gets no reading |
 
     The fault begins at the first tick at or after `time` and ends at the first tick at or after `until`. A sensor's fault
     acts directly after the sensor, on the reading that has arrived. If an estimator takes the readings, the fault acts on
-    the readings it takes, and kinds with memory count only new readings. Laws are not informed of a fault, and their
-    integrals continue.
+    the readings that it takes, and a fault with memory remembers only new readings. Laws are not informed of a fault, and
+    their integrals continue.
 
     Args:
         of: Key of the term or of the sensor.
         channel: Index of the channel, from 0, or "all"; 0 by default. For a sensor, index of the number in its reading: an
-            attitude has roll, pitch and yaw [rad]. If an estimator takes the readings, a `DVL` has its beams. An `IMU` then
-            has the means over a period of specific force (0 to 2) [m/s^2] and of angular rate (3 to 5) [rad/s].
+            attitude has roll, pitch and yaw [rad]. For sensors of an estimator, a channel of a `DVL` is a beam. An `IMU`
+            has as channels the means over a period of specific force (0 to 2) [m/s^2] and angular rate (3 to 5) [rad/s].
         kind: Kind of fault, or a list of kinds from which `choice` selects; "gain" by default.
-        choice: Index of the kind in that list, from 0; 0 by default.
+        choice: Index of the kind in the list `kind`, from 0; 0 by default.
         time: Time at which the fault begins [s]; 0 by default; inf for never.
-        until: Time at which the fault ends [s]; inf by default: it does not end.
+        until: Time at which the fault ends [s]; inf, the default, for a fault without end.
         gain: Factor on the command or reading; 0 by default.
         offset: Number added to the command or reading, in its unit; 0 by default.
-        value: Command or reading of a channel that is stuck; by default that at the onset.
+        value: Command or reading of a channel that is stuck; by default its value when the fault begins.
         time_constant: Time constant of kind "slow" [s]; 1 by default.
         delay: Delay of kind "delay" [s], to the nearest tick; 1 by default.
         duty: Fraction of each period, from its start, in which kind "intermittent" is on; 0.5 by default.
         period: Time from one onset to the next of kind "intermittent" [s], to the nearest tick; 1 by default.
-        known: Whether the allocation excludes an actuator's channel from `time` on, for good; False by default.
+        known: Whether the allocation excludes an actuator's channel from `time` to the end of the run; False by default.
 
     Raises:
         SceneError: If `of` is not a text, `channel` is not a whole number, a kind is unknown, `until` is not after `time`,

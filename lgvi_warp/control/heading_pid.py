@@ -12,7 +12,7 @@ from lgvi_warp.physics.terms.base import number
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class HeadingPID(IntegralLaw):
-    """PID of the heading: N = kp e + ki I + kd (wanted rate - r), where e is the wanted minus the measured heading.
+    """PID of the heading: moment N = kp e + ki I + kd (wanted rate - r), where e is the wanted minus the measured heading.
 
     e is in [-pi, pi], and r is the yaw rate. The integral I grows by e times the period at each tick.
 
@@ -21,8 +21,8 @@ class HeadingPID(IntegralLaw):
         ki: Integral gain [N m/(rad s)]; 0 by default.
         kd: Gain of the yaw rate [N m s/rad]; 0 by default.
         integral_limit: Largest size of I [rad s]; 1e6 by default.
-        anti_windup: "conditional", the default: an integrator stops while the actuators do not deliver the demand and its
-            error would increase the shortfall; or "none".
+        anti_windup: "conditional", the default, stops an integrator while the actuators do not deliver the whole demand
+            and the integrator's error would increase the missing part. "none" never stops an integrator.
 
     Examples:
         >>> import lgvi_warp as lw

@@ -27,8 +27,8 @@ class HeadingSMC(IntegralLaw):
         nomoto_gain: K of Nomoto's model T dr/dt + r = K N [rad/(s N m)].
         nomoto_time: T of Nomoto's model [s]; 0 by default.
         integral_limit: Largest size of I [rad s]; 1e6 by default.
-        anti_windup: "conditional", the default: an integrator stops while the actuators do not deliver the demand and its
-            error would increase the shortfall; or "none".
+        anti_windup: "conditional", the default, stops an integrator while the actuators do not deliver the whole demand
+            and the integrator's error would increase the missing part. "none" never stops an integrator.
     """
 
     type: ClassVar[str] = "heading_smc"

@@ -22,8 +22,8 @@ class HeavePID(IntegralLaw):
         ki: Integral gain [N/(m s)]; 0 by default.
         kd: Gain of the depth rate, the downward velocity over ground [N s/m]; 0 by default.
         integral_limit: Largest size of I [m s]; 1e6 by default.
-        anti_windup: "conditional", the default: an integrator stops while the actuators do not deliver the demand and its
-            error would increase the shortfall; or "none".
+        anti_windup: "conditional", the default, stops an integrator while the actuators do not deliver the whole demand
+            and the integrator's error would increase the missing part. "none" never stops an integrator.
     """
 
     type: ClassVar[str] = "heave_pid"

@@ -15,12 +15,12 @@ from lgvi_warp.physics.terms.base import number
 class LowPass(MeasuringPart):
     """First-order low-pass filter of one measured quantity, exact for readings that are held over a period.
 
-    At each tick x <- x + (1 - exp(-T / time_constant)) (measured - x), where T is the period; x starts at the first
-    reading. A difference of headings is taken within half a turn. An attitude turns by the same fraction of the rotation
-    to the measured attitude.
+    At each tick the output x <- x + (1 - exp(-T / time_constant)) (measured - x), where T is the period. It starts at the
+    first reading. A difference of headings is taken within half a turn. An attitude turns by the same fraction of the
+    rotation to the measured attitude.
 
     Args:
-        of: Quantity to filter, one of those of `lw.control.Sensor`.
+        of: Quantity to filter, one of those that an `lw.control.Sensor` measures.
         time_constant: Time constant of the filter [s]; 0 for no filter.
 
     Raises:

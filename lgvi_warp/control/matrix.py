@@ -15,10 +15,10 @@ from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, number
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class AllocationMatrix(Allocation):
-    """Allocation by a given matrix A: commands u = A w of the demand w = (X, Y, Z, K, M, N), each within its limit.
+    """Allocation by a given matrix A: commands u = A w for the demand w = (X, Y, Z, K, M, N), limited channel by channel.
 
-    The undelivered part of the demand is fed back to the laws. It is (I - A^+ A) w, plus A^+ times the part of the commands
-    that the limits cut off, where A^+ is the pseudo-inverse.
+    The undelivered part of the demand is fed back to the laws. It is w - A^+ A w, plus A^+ times the part of the commands
+    that the limits cut off, where A^+ is the pseudo-inverse of A.
 
     Args:
         to: Key of the term that takes the commands.

@@ -51,22 +51,24 @@ PLACES = {name: (place, wish) for place, (name, wish) in enumerate(_places())}
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Policy(ControlLaw):
-    """A trained perceptron (multilayer network): y = f(W y + b) layer by layer; the demand is `scale` times the last layer.
+    """A trained multilayer perceptron: each layer replaces y by f(W y + b); the demand is `scale` times the last output.
 
-    The file holds weights_0 (n1, n0), biases_0 (n1,), weights_1 (n2, n1), ... as np.savez writes them, uncompressed;
-    nothing in the file is executed. Inputs that are wanted minus measured values are "depth_error" [m], "heading_error"
-    [rad], "speed_error" [m/s], "position_error" [m, body axes], and "attitude_error", the e_R of `PosePID`. Inputs that are
-    measured values are "depth" [m] and, in body axes, "velocity" over ground [m/s], "water_velocity" [m/s],
-    "angular_velocity" [rad/s] and "down", the downward direction. A name with [0], [1] or [2] is one component of a vector.
+    The file holds W and b of each layer: weights_0 (n1, n0), biases_0 (n1,), weights_1 (n2, n1), ... as np.savez writes
+    them, uncompressed. n0 is the number of inputs. Nothing in the file is executed.
+
+    Inputs that are wanted minus measured values are "depth_error" [m], "heading_error" [rad], "speed_error" [m/s],
+    "position_error" [m, body axes], and "attitude_error", the e_R of `PosePID`. Inputs that are measured values are "depth"
+    [m] and, in body axes, "velocity" over ground [m/s], "water_velocity" [m/s], "angular_velocity" [rad/s] and "down", the
+    downward direction. A name with [0], [1] or [2] is one component of a vector.
 
     Args:
         file: Path of the .npz file. In a scene file the path is relative to the folder of the scene file.
-        inputs: Names of the inputs in their order; together they must have n0 numbers.
+        inputs: Names of the inputs in their order; together these inputs must have n0 numbers.
         outputs: Components of the demand that the last layer gives, among "X", "Y", "Z", "K", "M", "N", in their order.
         scale: Demand at an output of 1, one number for each output [N, N m]; 1 by default.
         activation: Activation of all layers but the last: "tanh", the default, or "relu".
         output_activation: Activation of the last layer: "linear", the default, "tanh", or "clip", which limits to [-1, 1].
-        checksum: Checksum of the file's numbers; a file with another checksum is refused. By default any file is read.
+        checksum: Checksum of the file's numbers; a file with another checksum is refused. By default it is not compared.
 
     Raises:
         SceneError: If the file cannot be read or does not fit `inputs` and `outputs`, or a number is invalid (see `Term`).

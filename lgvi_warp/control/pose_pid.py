@@ -16,7 +16,8 @@ class PosePID(PoseLaw):
 
     The demand is f = R^T (kp e_b + ki I) + kd (R^T v_d - nu) and tau = -kr e_R - kw (Omega - R^T R_d Omega_d) - ki_r I_R.
     The errors are e_b = b_d - b and e_R = vee(R_d^T R - R^T R_d) / 2; the index d marks wanted values. The integrals I and
-    I_R grow by e_b and e_R times the period at each tick.
+    I_R grow by e_b and e_R times the period at each tick. b: position, R: attitude (body to inertial axes), nu and Omega:
+    velocity and angular velocity in body axes, v_d: wanted velocity in inertial axes, vee: inverse of `lw.notation.hat`.
 
     Args:
         kp: Gains of the position error (3,) [N/m], inertial axes.
@@ -25,12 +26,12 @@ class PosePID(PoseLaw):
         kr: Gains of the attitude error (3,) [N m], body axes.
         ki_r: Gains of I_R (3,) [N m/s], body axes; 0 by default.
         kw: Gains of the angular velocity error (3,) [N m s], body axes.
-        integral_limit: Largest sizes of each number of I and of I_R, (2,) [m s, s]; 1e6 by default.
+        integral_limit: Largest size of each entry of I, and of each entry of I_R, (2,) [m s, s]; 1e6 by default.
         feedforward: "restoring" balances weight, buoyancy and their moment at the measured attitude. It uses the scene's
             nominal numbers for every member. "none", the default, adds nothing.
-        anti_windup: "conditional", the default: an integrator stops while the actuators do not deliver the demand and its
-            error would increase the shortfall; or "none". The position's integrator stops for each body axis separately,
-            since actuators act along body axes.
+        anti_windup: "conditional", the default, stops an integrator while the actuators do not deliver the whole demand
+            and the integrator's error would increase the missing part. The position's integrator stops for each body
+            axis separately, since actuators act along body axes. "none" never stops an integrator.
 
     Examples:
         >>> import lgvi_warp as lw

@@ -16,7 +16,7 @@ class PoseSMC(PoseLaw):
 
     For the position, s = (R^T v_d - nu) + 2 lambda R^T e_b + lambda^2 R^T I and f = k_d s + k_sigma sat(s / boundary). For
     the attitude, s_r = -(Omega - R^T R_d Omega_d) - 2 lambda_r e_R - lambda_r^2 I_R, and the moment has the same form as f.
-    e_b, e_R, I and I_R are those of `PosePID`, and sat(x) is x limited to [-1, 1].
+    All symbols without explanation are those of `PosePID`, and sat(x) is x limited to [-1, 1].
 
     Args:
         lambda_: Rates at which position errors decay while s is 0 (3,) [1/s]; its name is `lambda` in a scene file.
@@ -27,12 +27,12 @@ class PoseSMC(PoseLaw):
         boundary_r: As `boundary`, for the attitude (3,) [rad/s].
         k_sigma_r: As `k_sigma`, for the attitude (3,) [N m].
         k_d_r: As `k_d`, for the attitude (3,) [N m s].
-        integral_limit: Largest sizes of each number of I and of I_R, (2,) [m s, s]; 1e6 by default.
+        integral_limit: Largest size of each entry of I, and of each entry of I_R, (2,) [m s, s]; 1e6 by default.
         feedforward: "restoring" balances weight, buoyancy and their moment at the measured attitude. It uses the scene's
             nominal numbers for every member. "none", the default, adds nothing.
-        anti_windup: "conditional", the default: an integrator stops while the actuators do not deliver the demand and its
-            error would increase the shortfall; or "none". The position's integrator stops for each body axis separately,
-            since actuators act along body axes.
+        anti_windup: "conditional", the default, stops an integrator while the actuators do not deliver the whole demand
+            and the integrator's error would increase the missing part. The position's integrator stops for each body
+            axis separately, since actuators act along body axes. "none" never stops an integrator.
     """
 
     type: ClassVar[str] = "pose_smc"

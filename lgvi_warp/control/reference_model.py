@@ -24,15 +24,15 @@ TERMS = 13
 class ReferenceModel(Guidance):
     """Smooth path from the measured state to the values that preceding guidance wants (Fossen 2021, 12.1.1).
 
-    Each number x follows its target s by x''' + (2 zeta + 1) omega x'' + (2 zeta + 1) omega^2 x' + omega^3 (x - s) = 0. It
-    starts at the measured position, heading and rates. Between ticks the target is held and the equation is solved
+    Each coordinate x follows its target s, x''' + (2 zeta + 1) omega x'' + (2 zeta + 1) omega^2 x' + omega^3 (x - s) = 0.
+    The path starts at the measured position, heading and rates. Between ticks the target is held and the equation is solved
     exactly. If x' then exceeds its limit, x moves at the limit over the whole period, and x'' is 0. A heading turns the
     short way to its target and may pass pi. Wanted roll and pitch are not changed.
 
     Args:
         natural_frequency: omega (2,) [rad/s] of depth and heading, or (4,) of north, east, depth and heading.
         damping_ratio: zeta, one for each natural frequency; 1 by default.
-        rate_limit: Largest rates x', one for each natural frequency [m/s, and rad/s for the last]; by default no limit.
+        rate_limit: Largest rates x', one for each natural frequency [m/s; rad/s for the heading]; by default no limit.
     """
 
     type: ClassVar[str] = "reference_model"

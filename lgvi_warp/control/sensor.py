@@ -51,8 +51,8 @@ RANGE = "range"
 class Sensor(MeasuringPart):
     """Sensor of one quantity: truth + bias + random walk + noise, rounded; with a rate, a latency and lost readings.
 
-    The numbers are in the unit of the measured quantity: m, rad, m/s or rad/s. For a 3-vector, each is one number for all
-    axes or three numbers. The errors of an attitude turn it by a rotation vector in body axes, and its quantum applies to
+    Errors are in the unit of the measured quantity: m, rad, m/s or rad/s. For a 3-vector, give one number for all axes or
+    three numbers. The errors of an attitude turn it by a rotation vector in body axes, and its quantum applies to
     roll, pitch and yaw. The errors of a heading turn it about the vertical. The random numbers follow from the seed, the
     member, the tick and the sensor's name, so they are the same for all gains, methods and steps.
 
@@ -63,17 +63,17 @@ class Sensor(MeasuringPart):
         bias: Constant error added to each reading; 0 by default.
         drift: Standard deviation of the random walk after 1 s, in the unit of the reading / s^1/2; 0 by default.
         quantum: Readings are rounded to whole multiples of this number; 0 by default, for no rounding.
-        every: Ticks from one new reading to the next, a whole number; 1 by default. In between, the last reading is kept.
-        latency: Ticks until a reading arrives, a whole number; 0 by default. Until then the first reading is used.
-        dropout: Probability that a reading is lost, so that the last reading is kept; 0 by default. The first is never lost.
-        burst: Mean length of a run of lost readings [ticks], at least 1 and dropout / (1 - dropout); by default, or at 0,
-            losses are independent. The share of lost readings stays `dropout` (Gilbert 1960, a chain of two states).
+        every: Number of ticks from one new reading to the next; 1 by default. In between, the last reading is kept.
+        latency: Number of ticks after which a reading arrives; 0 by default. Until then the first reading is used.
+        dropout: Probability that a reading is lost, so that the last reading is kept; 0 by default.
+        burst: Mean length of a run of lost readings [ticks], at least 1 and at least dropout / (1 - dropout). By default, or
+            at 0, losses are independent. The fraction of lost readings stays `dropout` (Gilbert 1960, a chain of two states).
         outlier: Probability that a reading is an outlier; by default there are no outliers.
         outlier_std: Standard deviation of the error that an outlier adds to the reading.
         deepest: Depth of the sensor below which readings are lost [m], as for GPS; inf by default.
         place: Position of a sensor of position or depth on the body, such as an antenna, (3,) [m], body axes; by default the
             body's origin. The sensor reads the position or depth of this point.
-        reads: How a depth is read. "geometry", the default, is the distance from the mean surface. "pressure" is the
+        reads: Kind of depth reading. "geometry", the default, is the distance from the mean surface. "pressure" is the
             reading p / (rho g) of a pressure cell below the scene's tide. It includes the pressure of waves by linear theory,
             which decays with depth, and is 0 out of the water.
 

@@ -15,7 +15,7 @@ from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, number
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SetPoint(Guidance):
-    """Constant set-point of position, heading and speed. Preceding guidance sets any quantity that is omitted.
+    """Constant set-point of position, heading and speed. An omitted quantity is left to the guidance before this part.
 
     Args:
         position: Wanted position, (3,) [m], inertial axes.

@@ -15,7 +15,8 @@ class StateFeedback(ControlLaw):
     """Linear state feedback: the demand w = -K x of the error x (12,), as of a linear quadratic regulator.
 
     x = (b - b_d, e_R, nu - R^T v_d, Omega - R^T R_d Omega_d), measured minus wanted values: position in inertial axes [m],
-    attitude as in `PosePID` [1], velocity over ground [m/s] and angular velocity [rad/s] in body axes.
+    attitude as in `PosePID` [1], velocity over ground [m/s] and angular velocity [rad/s] in body axes. The index d marks
+    wanted values, and R is the attitude, from body to inertial axes.
 
     Args:
         K: Gains (6, 12) [N, N m per unit of x].

@@ -23,7 +23,7 @@ FASTEST = 1e15
 class Trajectory(Guidance):
     """Wanted position over time, with velocity and heading rate as feedforward.
 
-    Before the first time, the vehicle is to be at rest at the first position; after the last time, at the last position.
+    Before the first time, the wanted motion is rest at the first position; after the last time, rest at the last position.
 
     Args:
         times: Times (k,) [s], rising, at least two.

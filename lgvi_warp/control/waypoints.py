@@ -30,9 +30,9 @@ OF_POINTS = ("times", *CIRCLES)
 class Waypoints(Guidance):
     """Waypoints joined by straight legs; the heading follows by line of sight (Fossen 2021, 12.3-12.5).
 
-    Let y be the distance to starboard of the leg and D the look-ahead. The wanted heading is the leg's heading minus an angle:
+    y: the vehicle's distance to starboard of the leg, D: look-ahead. The wanted heading is the leg's heading minus an angle:
     "los": atan(y / D);
-    "ilos": atan((y + kappa J) / D), where dJ/dt = D y / (D^2 + (y + kappa J)^2) (Borhaug, Pavlov & Pettersen 2008);
+    "ilos": atan((y + kappa J) / D), integral dJ/dt = D y / (D^2 + (y + kappa J)^2) (Borhaug, Pavlov & Pettersen 2008);
     "alos": beta + atan(y / D), where beta is an estimate of the crab angle with d beta/dt = gamma D y / sqrt(D^2 + y^2)
     (Fossen & Aguiar 2024).
 
@@ -42,7 +42,8 @@ class Waypoints(Guidance):
     Args:
         points: Waypoints, (k, 3) [m], inertial axes: at least two; neighbours must differ in north or east.
         geodetic: Waypoints as latitude, longitude [deg, WGS 84] and depth [m], (k, 3), in place of `points`. The scene's
-            environment must have an origin. Legs are straight in the plane of its axes. Only `points` can vary by member.
+            environment must have an origin. Legs are straight in the plane of the inertial axes. Points that are given so
+            cannot vary by member.
         speed: Wanted forward speed through the water [m/s]; with `times`, the largest wanted speed.
         look_ahead: Look-ahead distance D [m].
         radius: Radius of acceptance [m], horizontal.
@@ -50,8 +51,8 @@ class Waypoints(Guidance):
         kappa: Gain of "ilos" [m/s]; 0.1 by default.
         gamma: Gain of "alos" [rad/(m s)]; 0.002 by default.
         at_end: Behaviour at the last point. With "stop", the default, the wanted heading is that of the last leg, the wanted
-            speed 0 and the wanted position the last point. With "go_on", the vehicle continues along the last leg beyond its
-            end. With "loiter", it circles the last point.
+            speed 0 and the wanted position the last point. With "go_on", the vehicle continues straight beyond the end of the
+            last leg. With "loiter", it circles the last point.
         times: Arrival time at each point, (k,) [s], rising. Before the first time the wanted speed is 0. By default there are
             no times.
         loiter_radius: Radius [m] of circles about points.

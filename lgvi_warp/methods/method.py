@@ -156,31 +156,31 @@ class Method(Summarized, Documented):
 
             * "phi", "phi_adjoint", "psi": the maps of Nordkvist & Sanyal 2010;
             * "psi_s" (default), "psi_1", "psi_x", "psi_x8", "psi_w": symmetric splittings of order 2;
-            * a composition of a symmetric method: "tj4(psi_s)", "su4(psi_s)", "kl6(psi_1)", "kl8(psi_s)" and so on; or
-              of the two halves of its step: "bm4(psi_x)", "bm6(psi_x)";
+            * a composition of a symmetric method, such as "tj4(psi_s)", "su4(psi_s)", "kl6(psi_1)" or "kl8(psi_s)";
+              or of the two halves of its step: "bm4(psi_x)", "bm6(psi_x)";
             * "rkn4_6", "rkn6_11", "rkn6_14": splittings into two parts, for weight and restoring moment;
             * "gauss4" to "gauss12": Gauss collocation with fixed-point iteration, for forces that depend on position
               and time;
-            * explicit Runge-Kutta methods that store R as two rows: "rk4", "rk5" (Dormand & Prince), "rk5_ck" (Cash &
-              Karp), "rk8" (of DOP853); explicit methods on the rotation group: "cg3" (Crouch & Grossman), "rkmk4"
-              (Munthe-Kaas);
+            * explicit Runge-Kutta methods that store two rows of the attitude matrix: "rk4", "rk5" (Dormand & Prince),
+              "rk5_ck" (Cash & Karp), "rk8" (of DOP853); explicit methods on the rotation group: "cg3" (Crouch &
+              Grossman), "rkmk4" (Munthe-Kaas);
             * "rkw3": linearly implicit in the damping, for strong damping and steady motion; without damping it is "rk4".
-        solver: Solver of equation (24) of that paper: "quartic" (default), "cayley", "newton" (on the exponential map,
-            as in the paper) or "moser_veselov" (explicit).
-        iterations: Newton steps, or fixed-point iterations, of every solve, 0 to 100. None (default) iterates each
+        solver: Solver of equation (24) of Nordkvist & Sanyal: "quartic" (default), "cayley", "newton" (on the exponential
+            map, as in the paper) or "moser_veselov" (explicit).
+        iterations: Number of Newton steps, or fixed-point iterations, of a solve, 0 to 100. None (default) iterates each
             vehicle to the tolerance. "auto" determines before the run the number that suffices for every member's start
             at twice the step. A solve that needs more iterations later gives its member the status NOT_CONVERGED.
-        tolerance: Relative residual of equation (24) above which a solve has not converged, between 0 and 1. Default:
-            1e-14 in float64 and 1e-6 in float32; 1e-12 and 1e-5 for a fixed number of iterations.
-        alpha: Weight of the old configuration in the average of nonconservative forces, equation (15), 0 to 1; default
-            0.5. It is used in phi, phi_adjoint and psi only.
+        tolerance: Relative residual of equation (24) above which a solve has not converged, between 0 and 1. By default
+            1e-14 in float64 and 1e-6 in float32; for a fixed number of iterations 1e-12 and 1e-5.
+        alpha: Weight of the old configuration in the average of nonconservative forces, equation (15), 0 to 1; 0.5 by
+            default. It is used in phi, phi_adjoint and psi only.
         beta: The same weight for nonconservative torques, equation (16).
-        rtol: Relative tolerance of the step control of rk5, rk5_ck and rk8; default None, a fixed step. The estimated
-            error of each step stays below atol + rtol |y|, in the mean square over y = (b, R, p, pi), with momenta
-            divided by the largest J. The vehicle with the largest error sets the step of its packet. The run's `h` is
-            then the longest step, and samples, events and statuses are taken at multiples of `h`.
+        rtol: Relative tolerance of the step control of rk5, rk5_ck and rk8; None, the default, for a fixed step. The
+            estimated error of each step stays below atol + rtol |y|, in the mean square over y: position, attitude and
+            momenta, these divided by the largest inertia. The vehicle with the largest error sets the step of its packet.
+            The run's `h` is then the longest step, and samples, events and statuses are taken at multiples of `h`.
         atol: Absolute tolerance of the step control; give both tolerances or none.
-        reason: Reason of an automatic choice, for the summary and the provenance. Default "".
+        reason: Reason of an automatic choice of the method, for the summary and the provenance; "" by default.
 
     Attributes:
         order: Order of convergence in the step.
@@ -259,7 +259,7 @@ class Method(Summarized, Documented):
 
     @property
     def two_part(self) -> bool:
-        """Whether the method splits into the parts A and B."""
+        """Whether the method splits the motion into the two parts A and B of "rkn4_6", "rkn6_11" and "rkn6_14"."""
         return self.base in TWO_PART
 
     @property
@@ -269,7 +269,7 @@ class Method(Summarized, Documented):
 
     @property
     def halved(self) -> bool:
-        """Whether each stage is two halves of different length."""
+        """Whether each stage consists of two halves of different length."""
         return parted(str(self.name))[1] in HALVES
 
     @property
@@ -296,7 +296,7 @@ class Method(Summarized, Documented):
     def stages(self) -> tuple[float, ...]:
         """The stage coefficients g_i: one step is the program over g_1 h, then over g_2 h, and so on.
 
-        For a method of two halves or two parts, their coefficients alternate.
+        For a method of two halves or two parts, the coefficients of the first and the second alternate.
         """
         composition = parted(str(self.name))[1]
         if self.two_part:
@@ -311,9 +311,9 @@ class Method(Summarized, Documented):
     def lengths(self, lead: float | None) -> tuple[tuple[float, ...], tuple[float, ...]]:
         """Lengths of the stages and of the lead, in steps.
 
-        The lead is a flow that opens and closes the program (see `merged`). Halves and parts have two lengths per
-        stage. If the lead is one of two parts, the stages have the lengths of the other part. Psi_h consists of two
-        halves over h/2: a half over the length a is listed as 2 a.
+        The lead is a flow that opens and closes the program (see `merged`). A method of halves or parts has two lengths
+        per stage. If the lead is one of two parts, the stages have the lengths of the other part. Since each half of a
+        step h has the length h/2, a half of the length a is listed as 2 a.
 
         Args:
             lead: Coefficient of the lead; None without a lead.
@@ -347,7 +347,7 @@ class Method(Summarized, Documented):
         return ORDERS[base] if composition is None else (COMPOSITIONS | HALVES)[composition][0]
 
     def force_tolerance(self, dtype: str) -> float:
-        """Tolerance of the iteration for the forces of Phi*.
+        """Tolerance of the iteration for the forces of the map "phi_adjoint".
 
         Args:
             dtype: "float64", or one of the float32 types.
@@ -364,7 +364,7 @@ class Method(Summarized, Documented):
             dtype: "float64", or one of the float32 types.
 
         Returns:
-            (rtol, atol) with step control; otherwise (tolerance of equation (24), tolerance of the forces of Phi*).
+            (rtol, atol) with step control; otherwise (tolerance of equation (24), `force_tolerance`).
         """
         if self.rtol is not None and self.atol is not None:
             return self.rtol, self.atol
@@ -377,7 +377,7 @@ class Method(Summarized, Documented):
             dtype: "float64", or one of the float32 types.
 
         Returns:
-            `tolerance` if set, else the default for this dtype and for the kind of iteration.
+            `tolerance` if set, otherwise the default for this dtype and for the kind of iteration.
         """
         if self.tolerance is not None:
             return self.tolerance

@@ -51,7 +51,7 @@ def hat(a: np.ndarray) -> np.ndarray:
 
 
 def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Cross products, as by np.cross, but in a third of its time for few vectors.
+    """Cross products, as by np.cross, but three times as fast for few vectors.
 
     Args:
         a: Vectors (..., 3).
@@ -82,7 +82,7 @@ def to_momenta(M: np.ndarray, J: np.ndarray, nu: np.ndarray, Om: np.ndarray) -> 
 
 
 def principal_axes(J: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Principal axes of inertia: J = Q diag(d) Q^T with det Q = +1. A diagonal J keeps its axes and their order.
+    """Principal axes Q and moments d of inertia: J = Q diag(d) Q^T, det Q = +1. A diagonal J keeps its axes and their order.
 
     Args:
         J: Inertia (n, 3, 3) [kg m2], symmetric.
@@ -101,7 +101,7 @@ def principal_axes(J: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def off_diagonal(matrices: np.ndarray) -> np.ndarray:
-    """The entries of 3x3 matrices off their diagonals.
+    """The off-diagonal entries of 3x3 matrices.
 
     Args:
         matrices: Matrices (n, 3, 3).
@@ -188,7 +188,7 @@ def rotate_out(Q: np.ndarray, vectors: np.ndarray) -> np.ndarray:
 
 
 def matrix_from_rotation_vector(f: np.ndarray) -> np.ndarray:
-    """Rotation matrix exp(hat(f)) by Rodrigues' formula; exact to round-off at f = 0.
+    """Rotation matrix exp(hat(f)) by Rodrigues' formula; accurate to round-off also near f = 0.
 
     Args:
         f: Rotation vectors (..., 3) [rad].
@@ -222,7 +222,7 @@ def matrix_from_quaternion(q: np.ndarray) -> np.ndarray:
 
 
 def quaternion_from_matrix(R: np.ndarray) -> np.ndarray:
-    """Unit quaternion of a rotation matrix (Shepperd 1978, which divides by the largest of the four components).
+    """Unit quaternion of a rotation matrix, by the method of Shepperd (1978), which divides by the largest component.
 
     Args:
         R: Rotation matrices (..., 3, 3).

@@ -69,7 +69,7 @@ class Vehicle(Summarized):
             run shows all of them in its messages.
         shape: Drawn shape of the vehicle, a table with `length` and `diameter` [m] or with `mesh`, the path of a .glb file; by
             default a hull of the displaced volume. It has no effect on the motion.
-        title: Name of the vehicle in summaries and reports; by default the name of a vehicle of the package.
+        title: Name of the vehicle in summaries and reports; by default its name if it comes with the package.
 
     Raises:
         SceneError: If a number is not finite, not positive, of the wrong shape, not symmetric or not positive definite.
@@ -228,8 +228,8 @@ class Vehicle(Summarized):
         """The vehicle as a table of a scene file.
 
         Returns:
-            Numbers by name, with diagonal 3x3 matrices given by their diagonal; the user's warnings, without those of the
-            vehicle; and the shape and the title, if given.
+            Numbers by name, with diagonal 3x3 matrices given by their diagonal; the user's warnings, without those that the
+            vehicle itself adds; and the shape and the title, if given.
         """
         content = {}
         for name, value in self.parameters().items():

@@ -72,41 +72,42 @@ class Result(Summarized):
             attitude (k, n, 3, 3) body to inertial, velocity (k, n, 3) [m/s, body], angular_velocity (k, n, 3) [rad/s, body].
             Signals of a controller need SaveAt(fields=...), and are the values after the tick at each time. These are
             command (k, n, channels); actuator (k, n, channels), after delay, fault, limit and lag; demand, unmet and
-            exerted (k, n, 6) [N, N m]; measured_position, _attitude, _velocity, _water_velocity, _angular_velocity, _depth,
-            _heading; reference_position, _attitude, _velocity (inertial), _angular_velocity, _depth, _heading, _speed.
+            exerted (k, n, 6) [N, N m]; "measured_" with position, attitude, velocity, water_velocity, angular_velocity, depth
+            or heading; "reference_" with position, attitude, velocity (inertial), angular_velocity, depth, heading or speed.
             Signals of a filter (see lw.control.ErrorStateFilter) are estimate_sigma (k, n, 15), estimate_bias (k, n, 6),
             nees, nis, nis_count (k, n), innovation and innovation_sigma (k, n, 12). energy_used (k, n) [J] needs a term
             `lw.terms.EnergyUse`; navigation_error (k, n, 3) [m, inertial] needs an estimate of the position.
         status: Status of each member, shape (n,). A member that an event stopped stays at its state from then on.
         failure_time: Time of each member's last good state, or of the event that stopped it [s], shape (n,); NaN
             without failure or event.
-        failure_value: The value that crossed its limit, shape (n,): |J^-1 a| or the relative residual (psi_x: half the
-            angle of its turns). It is 0 for a non-finite state and for an event, and NaN without failure or event.
-        warnings: Bits of Warnings, shape (n,). Warnings about the motion need checks="all", which checks it every 128
-            steps and at the end.
+        failure_value: The value that crossed its limit, shape (n,): |J^-1 a| or the relative residual of equation (24)
+            (docs/theory/rotation.md); for psi_x, half the angle of one of its rotations. It is 0 for a non-finite state
+            and for an event, and NaN without failure or event.
+        warnings: Warnings of each member, as bits of lw.Warnings, shape (n,). Warnings about the motion need
+            checks="all", which checks the motion every 128 steps and at the end.
         warning_time: Time at which each member's most serious warning was first seen [s], shape (n,); 0 for a warning
             about its start, NaN without a warning.
         warning_value: The value that caused the warning at that time, shape (n,); NaN without a warning.
         substeps: Number of steps that were divided (on_failure="substep"), shape (n,).
-        event: Number of the event that stopped each member, from 1; 0 for none, shape (n,). None if `status` identifies
-            it.
+        event: Number of the event that stopped each member, from 1; 0 for none, shape (n,). None if `status` alone
+            identifies the event.
         parameters: Parameters of the members by name, each with a leading dimension of 1 or n.
         starts: Numbers of the start that varied, by name, (n, ...): "start.position", "start.euler_deg", ...
-        weights: Statistical weights of the members, (n,), of mean 1 (see lw.designs.Table); None: equal weights.
+        weights: Statistical weights of the members, (n,), with mean 1 (see lw.designs.Table); None for equal weights.
         messages: Notes and warnings on the reliability of the result.
         provenance: Scene, ensemble with its seed, settings, versions and machine.
         terms: The scene's terms.
         statistics: Estimates of the statistics gathered during the run, by name.
-        kept: Result with the samples of the members in kept_members, if `keep` selected some members; else None.
-        kept_members: Indices of these members, shape (m,).
-        store: Folder from which samples and parameters are read each time they are used; None for a result in memory.
+        kept: Result with the samples of the members in kept_members, if `keep` selected some members; otherwise None.
+        kept_members: Indices of the m members whose samples are in `kept`, shape (m,).
+        store: Folder from which samples and parameters are read whenever they are used; None for a result in memory.
         jacobian: Derivatives of the samples with respect to the numbers in `tangents`, by field. Each has the shape of
             the samples and a last dimension for these numbers. NaN after a member ended. Empty without `tangents`.
-        tangents: Names of these numbers, as given in `solve(tangents=...)`.
-        end: Value of `final`, or a function without arguments that reads it; None if it was not kept.
+        tangents: Names of the numbers of these derivatives, as given in `solve(tangents=...)`.
+        end: Value of `final`, or a function without arguments that reads it; None if no final states were kept.
         compile_seconds: Time to load the kernel [s].
         compile_phases: Parts of compile_seconds [s]: `source` to write C++, `clang` to compile it (0 if cached),
-            `load`.
+            `load` to load it.
         run_seconds: Time of the run without compile_seconds [s].
         members: Number of members, n.
         end_time: Time up to which each member ran [s], shape (n,).
@@ -191,7 +192,7 @@ class Result(Summarized):
         return title, [row for row in rows if row[1]]
 
     def summary_picture(self) -> str:
-        """Curves of the depth of a few members; only for a run in memory, since a store may be slow."""
+        """Curves of the depth of a few members; none for a run in a store, which may be slow to read."""
         drawn = self if self.samples and self.store is None else self.kept
         if drawn is None or "position" not in drawn.samples:
             return ""
@@ -299,7 +300,7 @@ class Result(Summarized):
 
     @property
     def end_time(self) -> np.ndarray:
-        """Time up to which each member ran [s], shape (n,): its event, its failure, or the end of the run.
+        """Time up to which each member ran [s], shape (n,): the time of its event, of its failure, or of the end of the run.
 
         In survival analysis, end_time and `status` are the event times and event types.
         """
@@ -323,7 +324,7 @@ class Result(Summarized):
             places: Indices of the members in this result, counted from 0, shape (m,); a slice; or a mask (n,).
 
         Returns:
-            A result of these members alone. Its statistics are those of the whole run.
+            A result of these members alone. Its `statistics` are still the statistics of the whole run.
 
         Raises:
             SceneError: If the result does not have these members (this error is also an IndexError).
@@ -362,7 +363,7 @@ class Result(Summarized):
     def dataset(self) -> xarray.Dataset:
         """The samples as an xarray Dataset with dimensions time, realization, component (needs the extra `store`).
 
-        For a run in a store the values are read when they are used, and energy is omitted.
+        For a run in a store, values are read when they are used, and the energy is omitted.
 
         Raises:
             ImportError: If xarray is not installed.
@@ -455,7 +456,7 @@ class Result(Summarized):
 
     @classmethod
     def per_member(cls, arrays: Mapping[str, np.ndarray]) -> dict[str, Any]:
-        """Select the arrays that are arguments of a result with one number for each member.
+        """Select, among arrays, the arguments of a Result that have one number for each member.
 
         Args:
             arrays: Arrays of shape (n,), by name, including status and warnings.

@@ -45,7 +45,7 @@ class Ensemble(Summarized, Documented):
       field), ...
     * the numbers that the scene's start gives: "start.position", "start.angular_velocity", ..., and always
       "start.attitude";
-    * one entry of these: "start.position[2]";
+    * one entry of such a vector or matrix: "start.position[2]";
     * several numbers that one distribution draws jointly: "vehicle.mass, vehicle.buoyancy".
 
     A distribution for a vector applies to each entry. A distribution for a symmetric matrix applies to the entries on and
@@ -53,9 +53,9 @@ class Ensemble(Summarized, Documented):
 
     Args:
         scene: The scene whose numbers vary.
-        members: Number of members, >= 1; None for as many as the sampling has, or 1 (default).
-        seed: Whole number >= 0; by default 0.
-        vary: {name: distribution}, of lgvi_warp or frozen distributions of scipy.stats; None if nothing varies (default).
+        members: Number of members, >= 1. None, the default: the number that the sampling fixes (a grid, a table), or 1.
+        seed: Seed of all random draws, a whole number >= 0; by default 0.
+        vary: {name: distribution}, of lgvi_warp or frozen distributions of scipy.stats; None, the default, if nothing varies.
         sampling: "random" (default), "sobol", "halton", "saltelli", lw.designs.LatinHypercube(...), lw.designs.Grid(...),
             lw.designs.Table(...) and others, or a table as in a scene file.
 
@@ -68,13 +68,13 @@ class Ensemble(Summarized, Documented):
         parameters: Parameters of some members by name.
         numbers: All numbers of some members, including the start.
         starts: Varied numbers of the start of some members.
-        levels: Levels in (0, 1) from which distributions draw.
+        levels: Probability levels in (0, 1), which distributions convert to numbers.
         weights: Statistical weights of some members.
         select: Parameters and initial states of some members.
         varied: Names of the parameters that vary.
         member: One member as a separate ensemble.
         subset: Some members as a separate ensemble.
-        with_seed: Members drawn from the same distributions with another seed.
+        with_seed: New members, drawn from the same distributions with another seed.
         going_on: These members, continued from the end of a run.
         from_scene: The ensemble that a scene file describes.
         from_states: An ensemble with given states and parameters.
@@ -82,7 +82,7 @@ class Ensemble(Summarized, Documented):
 
     Raises:
         SceneError: If an argument is invalid; the message lists every fault, the number of unphysical members, and the first
-            of them.
+            such member.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -232,17 +232,17 @@ class Ensemble(Summarized, Documented):
 
     @property
     def sampling(self) -> Sampling:
-        """Design of the members' numbers."""
+        """Sampling design by which the members' numbers are drawn."""
         return self._draws.sampling
 
     @property
     def variations(self) -> Sequence[Variation]:
-        """Variations, one for each distribution."""
+        """The varied names with their distribution, one entry for each distribution."""
         return self._draws.variations
 
     @property
     def space(self) -> Space:
-        """The cube that the sampling fills."""
+        """The unit cube that the sampling fills, one dimension for each varied number."""
         return self._draws.space
 
     @property
@@ -289,7 +289,7 @@ class Ensemble(Summarized, Documented):
             parameters: Parameters of these members by name.
 
         Raises:
-            SceneError: If a member is unphysical; the message names the first of them.
+            SceneError: If a member is unphysical; the message names the first such member.
         """
         if stop > self.checked:
             self._checks().of_block(first, stop, parameters)
@@ -323,7 +323,7 @@ class Ensemble(Summarized, Documented):
         return self._values(first, stop, start=False)
 
     def levels(self, first: int, stop: int) -> Mapping[str, np.ndarray]:
-        """Return the levels in (0, 1) from which distributions draw some members' numbers.
+        """Return the probability levels in (0, 1) that distributions convert to some members' numbers.
 
         Args:
             first: Position of the first member.
@@ -417,7 +417,7 @@ class Ensemble(Summarized, Documented):
             stop: Position after the last member.
 
         Returns:
-            Weights (stop - first,), with the mean 1 over the table that gives them; None for equal weights.
+            Weights (stop - first,), with mean 1 over the whole table of the sampling; None for equal weights.
         """
         return self._draws.weights_of(first, stop)
 
@@ -495,7 +495,7 @@ class Ensemble(Summarized, Documented):
         """Return the same members with other noise.
 
         Args:
-            given: Standard normal numbers of each member, or one row for all; None for those drawn from counters.
+            given: Standard normal numbers of each member, or one row for all; None if the kernel draws them.
 
         Returns:
             The ensemble.
@@ -545,7 +545,7 @@ class Ensemble(Summarized, Documented):
         return ensemble
 
     def in_scene(self, scene: SceneLike, by_member: Sequence[str] = ()) -> Ensemble:
-        """Return the same members, in a scene with other terms, events or parts of the controller.
+        """Return the same members in another scene, with other terms, events or parts of the controller.
 
         Args:
             scene: The scene. Varied numbers must keep their names, or not exist in it.
@@ -563,7 +563,7 @@ class Ensemble(Summarized, Documented):
         return ensemble
 
     def with_seed(self, seed: int, members: int | None = None) -> Ensemble:
-        """Return these members, drawn from the same distributions with another seed.
+        """Return members drawn from the same distributions with another seed.
 
         Args:
             seed: Whole number >= 0.
@@ -609,7 +609,7 @@ class Ensemble(Summarized, Documented):
     def replicates(self) -> int:
         """Number r of independent replicates of the sampling: member i belongs to replicate i mod r.
 
-        It is 1 for a subset and for members with given states, since these are not a design.
+        r is 1 for a subset and for members with given states, since these are not a design.
         """
         is_design = self._draws.places is None and not self._draws.explicit
         return self.sampling.replicates_of_members() if is_design else 1

@@ -57,7 +57,7 @@ class Scene(Summarized):
         start: The state at t = 0, as lw.Start(...); by default at rest at the origin.
         controller: The controller, as lw.Controller(...) or a table as in a scene file; None, the default, for none.
         run: Settings of the run, the section [run] of a scene file.
-        ensemble_settings: Variations between members, the section [ensemble] of a scene file; None if nothing varies.
+        ensemble_settings: Members and their variations, the section [ensemble] of a scene file; None for one vehicle.
         events: Conditions that stop a member, such as lw.events.Surface(), or tables as in a scene file.
 
     Methods:

@@ -36,9 +36,9 @@ class Environment:
         gravity: Acceleration of free fall [m/s2], >= 0; by default 9.80665 (standard gravity).
         water_density: Density of the water [kg/m3], > 0; by default 1025 (sea water).
         origin: Latitude and longitude (2,) [deg, WGS 84] of the origin of the inertial axes, which point north, east and
-            down there; by default None, for unknown. Longitudes may be -180 to 180 or 0 to 360.
-        start: Date and time at t = 0, such as "2026-06-01T00:00:00Z", in UTC unless it names a time zone. By default None,
-            for unknown.
+            down there; None, the default, if it is unknown. Longitudes may be -180 to 180 or 0 to 360.
+        start: Date and time at t = 0, such as "2026-06-01T00:00:00Z", in UTC unless it names a time zone. None, the
+            default, if it is unknown.
 
     Attributes:
         start_time: Date and time at t = 0 in UTC; None if unknown.
@@ -189,8 +189,8 @@ def _moment(text: Any) -> np.datetime64 | None:
 class Start:
     """The state at t = 0.
 
-    Values that are None (default) are zero, and an attitude that is None is no rotation. Give at most one of `position` and
-    `geodetic`, one of the four attitudes, and one of the two velocities.
+    Values that are not given are zero, and without an attitude the body has the inertial axes. Give at most one of `position`
+    and `geodetic`, one of the four attitudes, and one of the two velocities.
 
     Args:
         position: Position of the body origin (3,) [m], inertial axes (north, east, down).

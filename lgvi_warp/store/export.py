@@ -54,7 +54,7 @@ def export(
     overwrite: bool = False,
     progress: Callable[[float], None] | bool | None = None,
 ) -> Path:
-    """Export a run, some of its members, or a scene to a file for other programs; the file name selects the format.
+    """Export a run, some of its members, or a scene to a file for other programs; the file extension selects the format.
 
     ".csv" and ".parquet": a table with one row per member and sample time, or one row per member if there are no samples.
     ".nc": NetCDF-4 with trajectories in the CF conventions. ".geojson" and ".kml": tracks on a map. ".mcap": odometry and
@@ -64,8 +64,8 @@ def export(
     Args:
         run: A result, a result.npz, a store, a folder with one result.npz or store, or the result of
             `lw.studies.footprint`. For ".fmu" a scene, or a scene file.
-        to: Path of the new file. Or a format, with the path in `out`: "netcdf" (all arrays of a store unchanged) or
-            "parquet".
+        to: Path of the new file; or a format, "netcdf" (all arrays of a store unchanged) or "parquet", with the path of
+            the file in `out`.
         out: Path of the new file if `to` is "netcdf" or "parquet"; by default next to the run.
         members: Indices, a slice or a mask of the members; by default all members whose samples were kept. Maps and
             MCAP take at most 1,000 members.
@@ -80,7 +80,7 @@ def export(
         Path of the file.
 
     Raises:
-        SceneError: If the run is incomplete or damaged or did not keep the data of this format, the file exists, or a
+        SceneError: If the run is incomplete, damaged or without data that the format needs, the file exists, or a
             library is missing.
         OSError: If the file cannot be written.
 

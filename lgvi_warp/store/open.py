@@ -133,7 +133,7 @@ def open_run(
     Args:
         path: A store, or a folder with one store.
         members: Members to open: indices from 0, in the order of the result; a slice; or a mask with a truth value for
-            each member. Default: all members.
+            each member. By default all members.
         incomplete: Whether to open an unfinished run too. Members that were not run yet read as NaN with status 0.
         statistics: The statistics that were passed to the run. Needed if one uses a function, which a store cannot save.
 

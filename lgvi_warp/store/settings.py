@@ -33,11 +33,11 @@ class Store:
 
     Args:
         path: A folder whose name ends in .zarr.
-        dtype: "float32" stores the samples of a float64 run in single precision; default the dtype of the run.
-        fields: Names of the fields whose samples are stored; default: all sampled fields.
+        dtype: "float32" stores the samples of a float64 run in single precision; by default the dtype of the run is used.
+        fields: Names of the fields whose samples are stored; by default all sampled fields.
         existing: Action if the folder already holds a run: "refuse" (default), "resume" (complete it, if it is the same
             run) or "overwrite".
-        force: Whether to resume on another machine or with other versions, which may change the bits; default False.
+        force: Whether to resume on another machine or with other software versions, which may change the bits; default False.
         chunk_bytes: Approximate largest size of a chunk [bytes]; default 10 MB. Each running block holds one chunk per
             field in memory.
 
@@ -83,16 +83,16 @@ class Store:
 
     @property
     def along(self) -> str:
-        """Name of the dimension of members in its arrays."""
+        """Name of the dimension of members in the store's arrays."""
         return MEMBER
 
     @property
     def whole(self) -> Path:
-        """Folder of the whole run to which the store belongs: here its own folder."""
+        """Folder of the whole run to which the store belongs; for this class, the store's own folder."""
         return self.folder
 
     def write_given(self, group: Any, plan: Plan) -> None:
-        """Write the states and parameters that the ensemble received as arrays: nothing else in the store has them.
+        """Write the states and parameters that the ensemble received as arrays, which nothing else in the store holds.
 
         Args:
             group: zarr group of the store.

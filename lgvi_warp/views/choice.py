@@ -65,17 +65,17 @@ def of_members(count: int, total: int) -> str:
 def select_members(result: Result, most: int = MOST_BODIES) -> Shown:
     """Choose the members that pictures and recordings show when they draw only some.
 
-    The members that reach farthest along each axis come first. Up to a third of the chosen members did not end "ok",
-    divided evenly between the outcomes. The other members are chosen by a hash of their index. The hash is
-    representative for grids, tables, Sobol points and random draws, and the same run always gives the same choice. At
-    most 240 evenly spaced times are shown. Quantiles are computed from at most 20,000 members, chosen by the same hash.
+    The members that reach farthest along each axis come first. Up to a third of the choice are members that did not end
+    "ok", divided evenly between the outcomes. The other members are chosen by a hash of their index. This choice is
+    representative for grids, tables, Sobol points and random draws, and always the same for the same run. At most 240
+    evenly spaced times are shown. Quantiles are computed from at most 20,000 members, chosen by the same hash.
 
     Args:
         result: A result with positions, in memory or in a store.
         most: Largest number of members to draw.
 
     Returns:
-        Members and times.
+        The indices of the chosen members, of the times, and of the members for quantiles.
 
     Raises:
         NothingToDraw: No samples were kept, or no member has a finite start.

@@ -55,15 +55,15 @@ def from_sdf(
     Args:
         source: Path of the file, or its text.
         model: Name of the model, if the file holds several.
-        link: Name of the main link; by default the link named by the plugin, else the first of the heaviest joined links.
+        link: Name of the main link; by default the link that the plugin names, or the first of the heaviest joined links.
         world: Another SDF file (path or text) with a <world> that gives gravity and density for the model.
         buoyancy: Buoyancy [N], instead of the buoyancy of the shapes.
         volume: Displaced volume [m3], instead of the volume of the shapes.
-        water_density: Density of the water [kg/m3]; by default that of the world or of a plugin, else 1000.
+        water_density: Density of the water [kg/m3]; by default that of the world or of a plugin, or 1000 without these.
         center_of_buoyancy: Position (3,) [m] in the main link's axes (z up), instead of the centre of the shapes.
-        gravity: Acceleration of free fall [m/s2]; by default the world's, else 9.80665.
-        include: {name: SDF file}, each file as path or text, that replace <include> elements. The name is the <name>, the
-            <uri> or the last part of the <uri>. By default none; a file named inside `source` is never opened.
+        gravity: Acceleration of free fall [m/s2]; by default that of the world, or 9.80665 if there is no world.
+        include: {name: SDF file}, each file as path or text, to replace <include> elements. The name is the element's <name>,
+            its <uri> or the last part of its <uri>. By default none; a file named inside `source` is never opened.
 
     Returns:
         The tables "vehicle", "environment" and "terms" of a scene file. Without a shape the vehicle is neutral.

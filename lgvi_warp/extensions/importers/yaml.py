@@ -54,8 +54,8 @@ def from_yaml(
 
     The file has these keys, at its top level or in one of its tables:
 
-    * mass, inertia (3, 3x3 or ixx ...) about the centre of gravity, cog and cob; or mass_matrix (6x6 or 6), the matrix of
-      the rigid body about the origin of the axes;
+    * mass, inertia about the centre of gravity (3, 3x3 or ixx ...), centre of gravity (cog) and of buoyancy (cob); or
+      mass_matrix (6x6 or 6), the matrix of the rigid body about the origin of the axes;
     * volume (with density), buoyancy or neutrally_buoyant;
     * added_mass (6x6 or 6); linear_damping, linear_damping_forward_speed and quadratic_damping (6 or 6x6), as
       derivatives or magnitudes; or a map `coefficients` of Fossen's names.
@@ -72,7 +72,7 @@ def from_yaml(
         ignore: Keys to leave out; other unknown keys are refused. By default none.
         table: Path in the file to the table to read, such as "vehicle.dynamics", or a list of keys; by default the whole
             file.
-        **given: Values by key (mass=..., density=...) that are added to those of the file or replace them.
+        **given: Values by key (mass=..., density=...), which are added to the values of the file or replace these.
 
     Returns:
         The tables "vehicle", "environment" and "terms" of a scene file.

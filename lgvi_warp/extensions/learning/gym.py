@@ -39,10 +39,10 @@ OfTicks = Callable[..., Any]
 class Vehicles:
     """Vehicles as a vector environment of Gymnasium; one step is one period of the scene's controller.
 
-    An action is a demand, or a command of an actuator, held until the next tick. An observation holds measured values,
+    An action is a demand or the commands of an actuator, held until the next tick. An observation holds measured values,
     including sensor errors, and wanted values. A vehicle that fails, or that an event of the scene stops, is terminated.
-    Each episode of each environment is a different member of the ensemble, with its own draws of all varied numbers. Laws of
-    the scene stay active, and the actions are added to their demands.
+    Each episode of each environment is a different member of the ensemble, with its own draws of all varied numbers. The
+    scene's control laws stay active, and the actions are added to their demands.
 
     `observe`, `reward` and `terminated` may be functions of (t, y, r): the time since the environments began [s], the measured
     and the wanted values (`lw.control.CallbackInput`) of m vehicles at once.
@@ -51,21 +51,23 @@ class Vehicles:
         fleet: An ensemble, or a scene with an ensemble of its own. The scene must have a controller.
         observe: Names of numbers, as listed in docs/controllers/gym.md and including the inputs of `lw.control.Policy`; or a
             function that returns (m, k).
-        act: "demand" (default): actions are added to the laws' demands. "command": actions are the commands of the only term
-            that takes commands. The key of a term: actions are its commands. Commands by actions replace those of the laws.
-        reward: Function that returns (m,); it may take the actions (m, n) as a fourth argument. None (default): 0.
-        terminated: Function that returns truth values (m,), True for each episode to end; None (default): no episode ends so.
-        duration: Length of an episode [s], after which it is truncated; default the scene's [run] duration, else no limit.
-        num_envs: Number of environments; default the number of members of the ensemble.
-        outputs: Demands among "X", "Y", "Z", "K", "M", "N" that the actions are; all by default.
-        scale: Demand or command at an action of 1, one number for all or one for each; actions are then in [-1, 1]. None
-            (default): actions are demands in N and N m without bounds, or commands in their unit within their limits.
+        act: "demand", the default: actions are added to the laws' demands. "command": actions are the commands of the only
+            term that takes commands. With the key of a term, actions are the commands of this term. Such actions replace the
+            commands that the laws would give.
+        reward: Function that returns rewards (m,), with the actions (m, n) as an optional fourth argument; by default 0.
+        terminated: Function that returns truth values (m,), True for each episode to end; None by default.
+        duration: Length of an episode [s], after which it is truncated. By default the duration of the scene's [run]; without
+            such a duration, episodes are not truncated.
+        num_envs: Number of environments; by default the number of members of the ensemble.
+        outputs: Components of the demand that the actions set, among "X", "Y", "Z", "K", "M", "N"; all by default.
+        scale: Demand or command at an action of 1, one number for all or one for each; actions are then in [-1, 1]. None, the
+            default: actions are demands in N and N m without bounds, or commands in their unit within their limits.
         instead_of: Keys of laws that the actions replace. A `Callback` is always replaced. None by default.
         autoreset_mode: gymnasium.vector.AutoresetMode or its value: "NextStep" (default), "SameStep" or "Disabled".
-        method: A name or a Method; default that of the scene.
-        h: Step [s]; default that of the scene.
-        dtype: Type of the kernel's numbers and of observations, "float64" or "float32"; default that of the scene.
-        width: Number of vehicles in a packet; default from the CPU.
+        method: A name or a Method; by default the scene's.
+        h: Step [s]; by default the scene's.
+        dtype: Type of the kernel's numbers and of observations, "float64" or "float32"; by default the scene's.
+        width: Number of vehicles in a packet; by default chosen for the CPU.
 
     Attributes:
         members: Indices of the members in the environments at present, (num_envs,).
@@ -233,8 +235,8 @@ class Vehicles:
         """Begin new episodes of all environments, with the time at 0, or of the environments in options["reset_mask"].
 
         Args:
-            seed: Seed of all draws from now on; episodes are counted from 0 again. None (default): the episodes use the next
-                members. At the first reset these are drawn with the seed of the ensemble.
+            seed: Seed of all draws from now on; episodes are counted from 0 again. None, the default: the episodes use the
+                next members of the present seed. The first seed is that of the ensemble.
             options: {"reset_mask": truth values (num_envs,)}; None (default) for all environments.
 
         Returns:
@@ -271,11 +273,11 @@ class Vehicles:
         return self._observed.copy(), {}
 
     def step(self, actions: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
-        """Hold the actions for a period.
+        """Apply the actions for one period of the controller.
 
         Args:
-            actions: (num_envs, n), in the order of `outputs` or of the commands. They are not clipped here, since actuators
-                have limits.
+            actions: (num_envs, n), in the order of `outputs` or of the commands. Actions are not clipped here, since the
+                actuators have limits.
 
         Returns:
             (observations, rewards, terminations, truncations, infos). If vehicles failed or were stopped by an event, infos

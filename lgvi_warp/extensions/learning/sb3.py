@@ -22,15 +22,15 @@ def sb3(env: Vehicles) -> Any:
     """Convert a vector environment to a `VecEnv`, the type that learners of Stable-Baselines3 accept.
 
     When an episode ends, the step returns the first observation of the next episode, whatever the autoreset mode of `env`.
-    In infos[i], "terminal_observation" is the last observation of the ended episode. "TimeLimit.truncated" is True if the
-    episode ended only because of its duration. "status" is the vehicle's status if it failed or an event stopped it. The
-    environment is shared, not copied: use either `env` or the result, not both.
+    In infos[i], for environment i, "terminal_observation" is the last observation of the ended episode.
+    "TimeLimit.truncated" is True if the episode ended only because of its duration. "status" is the vehicle's status if the
+    vehicle failed or an event stopped it. The environment is shared, not copied: use either `env` or the result, not both.
 
     Args:
         env: The environment, an `lw.gym.VectorEnv` with bounds of its actions.
 
     Returns:
-        stable_baselines3.common.vec_env.VecEnv of env.num_envs environments, with their spaces. After `seed(s)`, the next
+        A stable_baselines3.common.vec_env.VecEnv with the environments and spaces of `env`. After `seed(s)`, the next
         `reset()` uses the seed s for all environments. Rewards are float32 (num_envs,).
 
     Raises:

@@ -30,7 +30,7 @@ IMPLIED: tuple[Term, ...] = (Weight(), Restoring())
 def register(kind: type[AnyTerm]) -> type[AnyTerm]:
     """Register a user's term, event or part of a controller under its `type`, for scene files; use as a class decorator.
 
-    A class already registers itself when it is defined, unless its `type` is taken. This function raises an error then.
+    A class registers itself when it is defined, unless its `type` is taken. In that case this function raises an error.
 
     Args:
         kind: Subclass of `Term`, of `Event` or of a part, such as `ControlLaw`, with a new `type`.

@@ -47,7 +47,7 @@ class PackingContext:
             origin for the forces; False by default.
         time: Time at which the members start or continue [s]; 0 by default.
         remembered: Memory of the term if members continue, (n, rows) as in `Packed.memory`; None, the default, if they start.
-        given: Standard normal numbers that the call gives for these members; None, the default, to draw them from counters.
+        given: Standard normal numbers that the caller of a prepared run passes; None, the default: the kernel draws them.
     """
 
     parameters: Numbers
@@ -80,14 +80,14 @@ class Packed(NamedTuple):
     """A term's numbers in the form that its device code reads; the leading dimension n is 1 if all members share them.
 
     Args:
-        values: The fields of the device struct by name: numbers (n,), vectors (n, 3) in the kernel's axes, whole numbers,
+        values: The fields of the device struct by name: numbers (n,), vectors (n, 3) in the kernel's axes, one whole number,
             or whole numbers (n,).
-        rows: The term's rows of the device table, shape (n, rows), or several such arrays side by side, whose n may be 1 or
-            n independently; None for no rows.
+        rows: The term's rows of the device table, shape (n, rows), or several such arrays, which are joined along the rows.
+            Each array may have the leading dimension 1 (shared) or n. None for no rows.
         memory: The term's memory at the start, which it keeps from step to step, shape (n, rows); None for no memory.
         work: Number of scratch rows that the device code may overwrite during one call.
-        normals: Standard normal numbers given by the call, shape (n, rows). These are further rows of the table after the
-            term's own; the field `key` of the struct refers to them. None for no such numbers.
+        normals: Standard normal numbers that the caller of a prepared run passes (draws="given"), shape (n, rows). In the
+            table they follow the term's own rows; the field `key` of the struct refers to them. None for no such numbers.
     """
 
     values: dict[str, Any]
@@ -190,10 +190,10 @@ class Term(Documented):
         carries: Whether the term is a current that is the same everywhere and at all times, which exerts no force.
         carried: Whether the term changes the vehicle's inertia in time.
         anchored: Whether the term ties the vehicle to a fixed point, so that a current does work.
-        accounted: Whether the scene accounts the energy used.
-        memory_rows: Number of rows of memory, 0 at the start, of a term that does not define `packed`.
+        accounted: Whether the scene has an account of the energy used (`EnergyUse`).
+        memory_rows: Number of rows of memory, which start as zeros, of a term that does not define `packed`.
         key: Name in parameters: `name`, or the type.
-        conserves: Quantities that a motion under this term conserves.
+        conserves: Quantities that a motion conserves if only this term acts.
 
     Methods:
         parameters: The numbers that may vary by member.
@@ -456,14 +456,14 @@ class Term(Documented):
         }
 
     def odd_at(self, numbers: Numbers, position: Array) -> Mapping[str, tuple[Array, str]]:
-        """Oddities of members at their start position; none by default.
+        """Implausible numbers of members at their start positions; none by default.
 
         Args:
             numbers: The term's numbers by field, each of shape (n, ...).
             position: Positions (n, 3) [m].
 
         Returns:
-            {field: (mask of odd members (n,), reason)}; the reason is a text with {} for the depth.
+            {field: (mask of the members concerned (n,), reason)}; in the reason, {} stands for the depth.
         """
         return {}
 
@@ -485,11 +485,11 @@ class Term(Documented):
 
     @property
     def conserves(self) -> frozenset[str]:
-        """Quantities of `CONSERVED` that a motion conserves if only this law acts.
+        """Quantities, among those in `CONSERVED`, that a motion conserves if only this law acts.
 
         By default this is the energy, if the device code is POTENTIAL and has no other role, and `potential` is defined and
         does not depend on time. Any other law conserves nothing by default. A law whose potential depends only on depth and
-        on the attitude relative to the vertical conserves all three, and overrides this property.
+        on the attitude relative to the vertical conserves all three quantities; its author should override this property.
         """
         device = self.device
         follows = getattr(device, "POTENTIAL", False) and type(self).potential is not Term.potential
@@ -499,7 +499,7 @@ class Term(Documented):
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """Sentences on odd numbers, shown by `lgvi-warp check` and in the messages of a run; by default none."""
+        """Warnings about implausible numbers, for `lgvi-warp check` and the messages of a run; by default none."""
         return ()
 
     @property
@@ -792,7 +792,7 @@ def knots(at: np.ndarray, values: np.ndarray, steps: bool = False) -> np.ndarray
 
     Returns:
         Rows (1 or n, d + (k - 1) (d + 2)), where a value has d numbers: the first value, then for each interval its start,
-        1 / length and the change of the value. `table1` and `table3` take k - 1 as their count.
+        1 / length and the change of the value. `table1` and `table3` take k - 1, the number of intervals, as their count.
 
     Raises:
         SceneError: If `at` or `values` are not numbers of these shapes.

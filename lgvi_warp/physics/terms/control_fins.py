@@ -29,7 +29,7 @@ WORK_ROWS = 7
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ControlFins(Commanded, Fins):
-    """Fins that turn about their span; their deflection follows a command.
+    """n fins that turn about their span; each deflection follows a command.
 
     A positive deflection lifts along +normal if the flow comes from ahead. The deflection follows the command within
     `limit`, after a first-order lag and at most at `rate_limit`; at t = 0 it equals the command. A single number stands for
@@ -41,7 +41,7 @@ class ControlFins(Commanded, Fins):
         normal: Direction of lift, (n, 3), of any length but 0; its component along the chord is removed.
         area: Area A, (n,) [m2].
         drag: Drag coefficient along the flow, (n,).
-        drag_normal: Drag coefficient that grows with sin^2 a, where a is the angle of attack, (n,); 0 by default.
+        drag_normal: Factor of sin^2 a in the drag coefficient, where a is the angle of attack, (n,); 0 by default.
         lift_slope: Slope of the lift coefficient, (n,) [1/rad]. With a table of lift, a factor on its coefficients, 1 by
             default.
         lift_angles: Angles of attack of a table of lift, (k,) [rad], rising from 0; none by default.
@@ -49,7 +49,7 @@ class ControlFins(Commanded, Fins):
             last one. At negative angles they have the opposite sign.
         flow_angle: Whether the angle of the flow adds to the deflection, True by default. If False, let d be the deflection
             and u the flow along the chord: the lift is rho A/2 lift_slope d u^2, and the drag is
-            rho A/2 (drag + drag_normal d^2) |u| u.
+            rho A/2 (drag + drag_normal d^2) |u| u, where rho is the density of the water.
         limit: Largest size of the deflection, (n,) [rad]; 0.35 by default.
         rate_limit: Largest rate of the deflection, (n,) [rad/s]; by default no limit.
         time_constant: Time constant of the lag of the deflection, (n,) [s]; by default no lag.

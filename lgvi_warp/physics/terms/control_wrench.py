@@ -17,7 +17,7 @@ COMPONENTS = ("X", "Y", "Z", "K", "M", "N")
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ControlWrench(Term):
-    """An ideal actuator: force and torque about the body's origin commanded by a controller; zero without a controller.
+    """An ideal actuator: a controller commands force and torque about the body's origin. They are 0 without a controller.
 
     Each component n follows n' = (command - n) / time constant, with |n'| at most the rate limit and the command within the
     limit.

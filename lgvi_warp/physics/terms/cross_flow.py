@@ -16,7 +16,8 @@ from lgvi_warp.physics.terms.strips import GAUSS, StripTerm, across
 class CrossFlow(StripTerm):
     """Cross-flow drag of a slender hull, by strips: force per length -rho/2 Cd D |w| w (Hoerner 1965; Fossen 2021, chapter 8).
 
-    w is the velocity of the strip across the hull, relative to the water. Between stations the product Cd D is linear.
+    rho is the density of the water, and w the velocity of the strip across the hull, relative to the water. Between stations
+    the product Cd D is linear.
 
     Args:
         stations: Positions along the body's x axis, (k,) [m], rising; two or more.

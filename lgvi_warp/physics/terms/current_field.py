@@ -30,8 +30,8 @@ class CurrentField(InFile, Term):
     vary by member.
 
     Args:
-        velocities: Velocities of the water at the nodes, (x, y, z, 3) [m/s] in inertial axes; (t, x, y, z, 3) with `times`;
-            with scenarios (s, t, x, y, z, 3), or (s, x, y, z, 3) without `times`.
+        velocities: Velocities of the water [m/s], inertial axes, (x, y, z, 3) for x, y, z nodes along north, east and depth.
+            With `times`, t fields (t, x, y, z, 3). With s scenarios (s, t, x, y, z, 3), or (s, x, y, z, 3) without `times`.
         origin: Position of the first node, (3,) [m]: north, east, depth; zeros by default.
         spacing: Distance between nodes along north, east and depth, (3,) [m].
         times: Time of the first field and time step between fields, (2,) [s]; None, the default, for a constant field.
@@ -97,7 +97,7 @@ class CurrentField(InFile, Term):
         """Read a current from a data set in the CF conventions, such as those of CMEMS, HYCOM and ROMS.
 
         Only the requested region and times are read, field by field. Latitudes and longitudes are converted to metres in the
-        plane that touches the Earth at `origin`, and velocities to its axes.
+        plane that touches the Earth at `origin`, and velocities to the axes of this plane.
 
         Args:
             source: Path of a NetCDF file, or an xarray Dataset.
@@ -114,15 +114,15 @@ class CurrentField(InFile, Term):
             spacing: Distances between the nodes of the regular grid [m], (3,); by default at least as fine as the data, with
                 at most 100 levels in depth.
             fill: Treatment of missing values, on land and below the sea floor: "nearest", the default, "zero", or "refuse".
-            checksum: Checksum of the numbers of the file, so that a changed file is refused; by default it is not checked.
-            attributes: Missing or wrong attributes of the file, for instance {"u.units": "m s-1"}; "name" without a variable
-                is an attribute of the file itself.
-            outside: As in the class, but "stop" by default.
+            checksum: Checksum of the numbers of the file; a changed file is refused. By default any file is read.
+            attributes: Missing or wrong attributes of the file, for instance {"u.units": "m s-1"}; a key without a
+                variable is an attribute of the file itself.
+            outside: As in the class; "stop" by default.
             scenario: As in the class. Scenarios are the dimension `realization`, `member`, `ensemble` or `number`.
             name: As in `Term`.
 
         Returns:
-            The field. Its `data` has the number of missing values, and the largest change by the regular grid [m/s].
+            The field. Its `data` has the number of missing values, and the largest change of a velocity by regridding [m/s].
 
         Raises:
             SceneError: If the data set has no known velocities, has unknown axes, or does not cover the region or the times;

@@ -28,7 +28,7 @@ PARTS = {
 class Drag(Term):
     """Drag along and about each body axis: force = -(linear + quadratic |v|) v, torque likewise (Fossen 2021, section 8.1).
 
-    Velocities are relative to the water, at the user's origin.
+    v is the velocity along the axis, relative to the water and at the user's origin; for the torque, the angular velocity.
 
     Args:
         linear: Linear coefficients, (6,) [N s/m, N m s], at least 0; 0 by default.

@@ -214,8 +214,8 @@ class MissionDone(Event):
 class Outside(Event):
     """Stop a member when the body's origin leaves the grid of a `current_field`, or sinks below its last level.
 
-    A field with `outside = "stop"` adds this event itself; no other field can have it. Members do not stop along an axis of
-    one node, or above the first level.
+    A field with `outside = "stop"` adds this event to its scene itself; for any other field the event is refused. Along an
+    axis with only one node, and above the first level, members do not stop.
 
     Args:
         field: Name of the field; "current_field" by default.

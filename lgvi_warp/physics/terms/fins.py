@@ -30,8 +30,8 @@ PARALLEL = 1e-6
 class Fins(Term):
     """n fixed fins with lift rho A/2 lift_slope sin(a) cos(a) V^2 and drag rho A/2 (drag + drag_normal sin^2 a) V^2.
 
-    V and a are the speed and angle of attack of the flow in the plane of chord and normal. A single number stands for n equal
-    numbers.
+    V and a are the speed and angle of attack of the flow in the plane of chord and normal, and rho is the density of the
+    water. A single number stands for n equal numbers.
 
     Args:
         position: Point at which each fin's force acts, (n, 3) [m] from the body's origin.
@@ -40,7 +40,7 @@ class Fins(Term):
         area: Area A, (n,) [m2].
         lift_slope: Slope of the lift coefficient, (n,) [1/rad].
         drag: Drag coefficient along the flow, (n,).
-        drag_normal: Drag coefficient that grows with sin^2 a, (n,); 0 by default.
+        drag_normal: Factor of sin^2 a in the drag coefficient, (n,); 0 by default.
 
     Raises:
         SceneError: If chord and normal are parallel, or a number is invalid (see `Term`).

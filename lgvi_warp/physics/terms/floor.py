@@ -35,7 +35,7 @@ class Floor(InFile, Event):
         depth: Depth of the floor [m]; or a grid of depths, (x, y) [m], at the nodes along north and east.
         origin: Position of the grid's first node, (2,) [m]: north and east; zeros by default.
         spacing: Distance between nodes along north and east, (2,) [m]; required with a grid.
-        clearance: Height above the floor at which members stop [m]; 0 if omitted. Give a value if it varies by member.
+        clearance: Height above the floor at which members stop [m]; 0 if omitted. Give a number to let it vary by member.
         contact: "stop", the default; or "rest", so that members land on the floor by a term `lw.terms.BottomContact`.
 
     Methods:
@@ -86,7 +86,7 @@ class Floor(InFile, Event):
         contact: str = STOP,
         name: str = "",
     ) -> Self:
-        """Read a floor on a grid from a file: NetCDF in the CF conventions, such as that of GEBCO, or a GeoTIFF.
+        """Read a floor on a grid from a file: NetCDF in the CF conventions, such as the files of GEBCO, or a GeoTIFF.
 
         Args:
             file: Path of the file, or an xarray Dataset.

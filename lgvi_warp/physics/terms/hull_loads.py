@@ -19,13 +19,13 @@ class HullLoads(StripTerm):
     The loads are computed by strips. The vehicle's added mass and the water velocity at its origin give the loads in water
     that is uniform along the hull. This term adds the differences at each station: the pressure of the undisturbed water,
     the momentum of the water that the strip sets in motion, and cross-flow drag with the local flow. The term includes the
-    drag of `CrossFlow`: use only one of the two.
+    drag of `CrossFlow`: use only one of the two terms.
 
     Args:
         stations: Positions along the body's x axis, (k,) [m], rising; two or more, from stern to bow.
         diameters: Breadth D of the hull across the flow, (k,) [m], linear between stations.
         added_mass: Added mass across the hull per length, (k,) [kg/m], linear between stations; by default that of a
-            slender round hull, rho pi D^2 / 4.
+            slender round hull, rho pi D^2 / 4 with the density rho of the water.
         drag_coefficient: Drag coefficient Cd, (k,), or one number for all stations; 0 by default.
 
     Raises:

@@ -34,7 +34,7 @@ class Weight(Term):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Restoring(Term):
-    """Moment of buoyancy and weight about the body's origin (section IV of Nordkvist & Sanyal 2010). It has no numbers."""
+    """Moment of buoyancy and weight about the body's origin (Nordkvist & Sanyal 2010, section IV). The term has no numbers."""
 
     type: ClassVar[str] = "restoring"
 

@@ -49,12 +49,13 @@ def _signed(word: int) -> int:
 class NoisyTerm(Term):
     """Base class of terms with random numbers, which follow from seed, member, the term's name and the number of the draw.
 
-    The device struct has a field `key`. The device code sets NOISE = True and gets the numbers of a step by
-    `normals_over(view, p.key, stream)`.
+    The author's device code must set NOISE = True, and gets the numbers of a step by `normals_over(view, p.key, stream)`.
+    This class adds the field `key` to the device struct. A subclass that defines `packed` must add its value by `noise_key`,
+    and device code that has its own `params` must declare it.
 
     Args:
-        noise_step: Time from one draw to the next [s]. Runs whose steps are whole multiples of it have the same noise path; no
-            other step is allowed. None, the default, draws once a step, so that runs with different steps have different
+        noise_step: Time from one draw to the next [s]. The step of a run must be a whole multiple of it; all such runs have
+            the same noise path. None, the default, draws once a step, so that runs with different steps have different
             paths.
 
     Methods:
@@ -75,7 +76,7 @@ class NoisyTerm(Term):
             h: Step of the run [s].
 
         Returns:
-            1 without a `noise_step`; else the whole number nearest to h / noise_step, at least 1.
+            1 without a `noise_step`; otherwise the whole number nearest to h / noise_step, at least 1.
         """
         return 1 if self.noise_step is None else max(1, round(h / self.noise_step))
 

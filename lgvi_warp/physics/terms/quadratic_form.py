@@ -164,7 +164,7 @@ class QuadraticForm(Term):
 
         Args:
             coefficients: Dimensionless values by name: forces divided by rho U^2 L^2 / 2, moments by rho U^2 L^3 / 2, and
-                rates multiplied by L / U.
+                rates multiplied by L / U, where U is the speed.
             rho: Density of the water [kg/m3].
             length: Reference length L of the dimensionless coefficients [m].
             added_mass: The vehicle's added mass, (6, 6) [kg, kg m, kg m2]. Published coefficients include its effect (X'wq,

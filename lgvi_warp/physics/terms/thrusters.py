@@ -43,9 +43,9 @@ from lgvi_warp.physics.terms.thrust_curves import (
 class Thrusters(Commanded):
     """n thrusters, each with thrust = c+ f+(max(u - band, 0)) - c- f-(max(-u - band, 0)) along its direction (Fossen 2021, 9).
 
-    f(w) = polynomial_1 w + polynomial_2 w^2 + ..., by default w^2, or a table. u follows the command after the lag, within
-    the limit and the rate limit. A single number stands for n equal numbers. The user chooses the unit of the command, such
-    as 1, V or rad/s.
+    f(w) = polynomial_1 w + polynomial_2 w^2 + ..., by default w^2, or a table; f+ is f ahead and f- astern. u follows the
+    command after the lag, within the limit and the rate limit. A single number stands for n equal numbers. The user chooses
+    the unit of the command, such as 1, V or rad/s.
 
     Beyond the dead band, w = sign(u) max(|u| - band, 0). Thrust falls by advance_loss |w| a and torque by torque_loss |w| a,
     where a is the speed of the thruster through the water along its direction (Fossen 2021, 9.1).
@@ -54,19 +54,19 @@ class Thrusters(Commanded):
         position: Point at which each thrust acts, (n, 3) [m] from the body's origin.
         direction: Direction in which each thruster pushes the vehicle, (n, 3), of any length but 0.
         coefficient: Coefficient c+ ahead, (n,) [N per unit of f]; 1 by default if a polynomial [N] is given.
-        coefficient_astern: Coefficient c- astern, (n,) [N per unit of f]; by default that ahead.
+        coefficient_astern: Coefficient c- astern, (n,) [N per unit of f]; by default the coefficient ahead.
         polynomial: Polynomial f+ of all thrusters, (p,), from the first power up; w^2 by default.
-        polynomial_astern: Polynomial f- of all thrusters, (q,), from the first power up; by default that ahead.
+        polynomial_astern: Polynomial f- of all thrusters, (q,), from the first power up; by default the polynomial ahead.
         table_commands: Commands of a table of thrust, (t,) [unit], rising; instead of polynomials. None by default.
         table_thrusts: Thrusts at these commands, (t, n) [N], or (t,) for n equal thrusters, linear between the commands and
             constant outside. They must rise and be 0 at the command 0; near this command several may be 0.
-        advance_loss: Loss of thrust c_u ahead, (n,) [N per unit and m/s]; by default no loss.
-        advance_loss_astern: Loss of thrust c_u astern, (n,) [N per unit and m/s]; by default that ahead.
+        advance_loss: Coefficient of the loss of thrust ahead, (n,) [N per unit and m/s]; by default no loss.
+        advance_loss_astern: The same coefficient astern, (n,) [N per unit and m/s]; by default the coefficient ahead.
         torque_coefficient: Torque on the vehicle about the direction per unit of w |w|, (n,) [N m per unit^2]. Its sign
             depends on the propeller's sense of rotation. None by default.
-        torque_loss: Loss of torque, (n,) [N m per unit and m/s], with the sign of the torque; 0 by default.
-        power_commands: Commands of a table of power, (s,) [unit], rising, beyond the dead band like those of thrust; by
-            default `table_commands`.
+        torque_loss: Coefficient of the loss of torque, (n,) [N m per unit and m/s], with the sign of the torque; 0 by default.
+        power_commands: Commands of a table of power, (s,) [unit], rising; these are values of w, as in the table of thrust.
+            By default `table_commands`.
         power: Electrical power at these commands, (s, n) [W], or (s,) for n equal thrusters, linear between the commands and
             constant outside. None by default, for no power (see `EnergyUse`).
         shaft_speed: Angular speed of the propeller per unit of w, (n,) [rad/s per unit], instead of a table. The power is then
@@ -82,7 +82,7 @@ class Thrusters(Commanded):
 
     Methods:
         thrust: Steady thrust at given commands.
-        command_for: The smallest commands that give these thrusts.
+        command_for: The smallest commands that give requested thrusts.
 
     Raises:
         SceneError: If a direction has length 0, times or a table do not rise, the command is given twice, a table is given
@@ -288,7 +288,7 @@ class Thrusters(Commanded):
         return np.asarray(np.abs(self.thrust(self.command_schedule) @ wrenches).max(axis=0))
 
     def command_for(self, thrust: Any) -> np.ndarray:
-        """The smallest commands that give these thrusts.
+        """The smallest commands that give requested thrusts.
 
         Args:
             thrust: Thrusts (n,), or one number for all [N].

@@ -64,7 +64,7 @@ def report(result: Result | str | os.PathLike[str], path: str | os.PathLike[str]
 
     The report of a run has the outcomes of the members with remedies, notes and warnings, pictures, and statistics with
     intervals. It also has the settings, the original text of the scene, and the command that repeats the run. The
-    report of a study has the pictures and tables of its folder.
+    report of a study has the pictures and tables in the folder of the study.
 
     Args:
         result: A result, or a folder with a run, a trade-off, a stability map, a sensitivity study, a sweep or several

@@ -38,7 +38,7 @@ def movie(
     seconds: float = 6.0,
     by: str | None = None,
 ) -> Path:
-    """Write an animation of a run, for a talk or a page: the recording as the viewer shows it, without a window.
+    """Write an animation of a run, for a talk or a web page: the picture of the rerun viewer, drawn without a window.
 
     If the viewer cannot draw, because a graphics driver or rerun-sdk is missing, Matplotlib draws the fleet: a view
     from above, and the depth over time.
@@ -46,10 +46,10 @@ def movie(
     Args:
         result: A result with position, attitude and velocity, in memory or in a store.
         path: The file: .webp, .gif or .png (an animated PNG).
-        members: Indices of the members to draw, as [3, 17]; default: the choice of `lgvi_warp.select_members`.
+        members: Indices of the members to draw, such as [3, 17]; by default the choice of `lgvi_warp.select_members`.
         frames: Number of pictures, evenly spaced over the run's time, at least 2; default 60.
         seconds: Duration of the animation [s], above 0; it then repeats. Default 6.
-        by: "viewer" or "plot" to allow only one of the two; default None: the viewer if it can draw, else Matplotlib.
+        by: "viewer" draws with the viewer, "plot" with Matplotlib. By default Matplotlib draws only if the viewer cannot.
 
     Returns:
         The path of the file.

@@ -36,16 +36,17 @@ def record(
     """Record the fleet for the rerun viewer. The file appears only when it is complete.
 
     Hulls of the vehicle's shape are drawn for the members and times of `lgvi_warp.select_members`. A hull takes the colour
-    of its outcome at the time at which the member ended. Curves show the members under way at each time. The same run
-    always gives the recording and the application the same ids, by which the viewer distinguishes recordings and layouts.
+    of its outcome at the time at which the member ended. Curves show medians and quantiles over the members that still run
+    at each time. Another recording of the same run has the same ids of recording and application, by which the viewer
+    distinguishes recordings and layouts.
 
     Args:
         result: A result with position, attitude and velocity, in memory or in a store; or a mapping of names to
             results, which are shown side by side, each in its own colour.
-        path: The file; None (default) is allowed only with `to`.
-        members: Indices of the members to draw, as [3, 17]; default: the choice of `lgvi_warp.select_members`.
-        to: Additional receiver: an rr.RecordingStream, or the address of a viewer, as
-            "rerun+http://127.0.0.1:9876/proxy"; default none.
+        path: Path of the file; None (default) is allowed only with `to`.
+        members: Indices of the members to draw, such as [3, 17]; by default the choice of `lgvi_warp.select_members`.
+        to: Additional receiver: an rr.RecordingStream, or the address of a viewer, such as
+            "rerun+http://127.0.0.1:9876/proxy"; by default none.
 
     Returns:
         The path of the file; None if `path` is None.
@@ -54,8 +55,8 @@ def record(
         ImportError: rerun-sdk is not installed (extra: viz).
         NothingToDraw: No samples were kept, or no member has a finite start.
         SceneError: The run does not have these members, or the vehicle's mesh cannot be read.
-        OSError: The file cannot be written; or no viewer answers at the address, or it ends too early (the file is
-            complete then).
+        OSError: The file cannot be written; or no viewer answers at the address, or the viewer ends too early (the
+            file is complete then).
         ValueError: There is no result; or neither `path` nor `to` is given (a SceneError, which is a ValueError).
 
     Examples:
@@ -99,13 +100,13 @@ def show(result: Result | Mapping[str, Result], *, members: Any = None) -> None:
 
     Args:
         result: As for `lw.record`.
-        members: Indices of the members to draw; default: the choice of `lgvi_warp.select_members`.
+        members: Indices of the members to draw; by default the choice of `lgvi_warp.select_members`.
 
     Raises:
         ImportError: rerun-sdk is not installed (extra: viz).
         NothingToDraw: No samples were kept, or no member has a finite start.
         SceneError: The run does not have these members, or the vehicle's mesh cannot be read.
-        OSError: The viewer cannot be started, for example without a display; the message has the path of the recording.
+        OSError: The viewer cannot be started, for example without a display; the message gives the path of the recording.
     """
     viewer.rerun()
     # The viewer reads the file after this returns; the system clears its folder for temporary files.

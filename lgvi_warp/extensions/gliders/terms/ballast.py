@@ -30,11 +30,11 @@ from lgvi_warp.physics.terms.wrench import at_start, commands
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Ballast(Commanded):
-    """n volumes V displaced in addition to the hull: force -rho g V R^T e3 at points of the body (Graver 2005, ch. 4).
+    """n volumes V of water displaced in addition to the hull: force -rho g V R^T e3 at points of the body (Graver 2005).
 
-    V follows the command after the lag, within the limit and the rate limit. A positive V lifts the vehicle, a negative V
-    sinks it. A weight of N newtons in water is V = -N / (rho g). The vehicle's mass does not change, as when oil is pumped
-    into a bladder.
+    R^T e3 is the downward vertical in body axes. V follows the command after the lag, within the limit and the rate limit. A
+    positive V lifts the vehicle, a negative V sinks it. To model a weight of N newtons in water, use V = -N / (rho g). The
+    vehicle's mass does not change, as when oil is pumped into a bladder.
 
     With an efficiency, the pump's work is part of the energy used (`EnergyUse`). The energy is the water's pressure relative
     to the surface, times the volume that is pumped out, divided by the efficiency. If the pressure pushes volume back in,
@@ -44,9 +44,9 @@ class Ballast(Commanded):
         position: Point at which each volume acts, (n, 3) [m] from the body's origin; by default one volume at the origin.
         limit: Largest size of the command, (n,) [m3]; 1e6 by default.
         time_constant: Time constant of the first-order lag from the command to V, (n,) [s]; 0 by default, for no lag.
-        rate_limit: Largest rate of change of V, that of the pump, (n,) [m3/s]; by default no limit.
+        rate_limit: Largest rate of change of V, such as the pump's rate, (n,) [m3/s]; by default no limit.
         efficiency: Work against the water's pressure divided by the electrical energy of each pump, (n,), above 0 and at
-            most 1. If omitted, the volumes use no energy, as for weights that are dropped.
+            most 1. If omitted, the volumes use no energy, as when weights are dropped.
         command: Constant volume, (n,) [m3]; 0 by default.
         times: Times of the schedule, (k,) [s], rising.
         command_schedule: Volumes at these times, (k, n) [m3], linear between them; instead of `command`.

@@ -26,8 +26,9 @@ NUMBERS = ("pump_rate", "volume_down", "volume_up", "depth_top", "depth_bottom",
 class BuoyancyEngine(Term):
     """A volume V in addition to the hull, which a pump changes to `volume_down` or `volume_up`: force -rho(d) g V R^T e3.
 
-    In a dive, the pump starts to pump to `volume_up` when the body's origin reaches `depth_bottom`. In an ascent, it starts
-    to pump to `volume_down` when the origin reaches `depth_top` (Graver 2005, 4; Eriksen et al. 2001). The start of pumping
+    rho(d) is the density of the water at the depth d, and R^T e3 the downward vertical in body axes. In a dive, the pump
+    starts to pump to `volume_up` when the body's origin reaches `depth_bottom`. In an ascent, it starts to pump to
+    `volume_down` when the origin reaches `depth_top` (Graver 2005, 4; Eriksen et al. 2001). The time at which the pump starts
     is located within the step, to second order.
 
     With an efficiency, the pump's work is part of the energy used (`EnergyUse`). The energy is the water's pressure relative
@@ -45,7 +46,7 @@ class BuoyancyEngine(Term):
         gradient: Relative change of the water's density per depth [1/m], as in `Stratification`; 0 by default.
         reference_depth: Depth at which the density is that of the environment [m]; 0 by default.
         efficiency: Work against the water's pressure divided by the electrical energy of the pump, above 0 and at most 1. If
-            omitted, the pump does not count in the energy account.
+            omitted, the energy used does not include the pump.
         first: Direction at the start: "down", the default, or "up".
 
     Raises:

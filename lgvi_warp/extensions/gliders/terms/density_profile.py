@@ -35,13 +35,13 @@ class DensityProfile(Term):
 
     The hull's buoyancy is B rho(d) / rho0 (1 - compressibility (d - d0)). B is the vehicle's buoyancy, rho0 the water
     density of the environment, and d the depth of the centre of buoyancy. `ballast` and `buoyancy_engine` displace water
-    of the density rho(d), and their pumps work against its weight. Drag and added mass use rho0.
+    of the density rho(d), and their pumps work against the pressure of this water. Drag and added mass use rho0.
 
     Args:
         depths: Depths, (k,) [m], rising.
         densities: In-situ densities at these depths, (k,) [kg/m3], that is, at the pressure of the depth.
         compressibility: Relative loss of the hull's volume per depth [1/m]; none by default.
-        reference_depth: The depth d0 at which the hull has its volume B / (rho0 g) [m]; 0 if omitted.
+        reference_depth: Depth d0 at which the hull's volume is B / (rho0 g) [m]; 0 if omitted.
 
     Methods:
         from_cast: Profile of a CTD cast, from arrays of temperature and salinity or from a file.
@@ -91,7 +91,7 @@ class DensityProfile(Term):
 
         Raises:
             SceneError: If a column is missing or invalid; the message names the remedy.
-            MissingExtra: If gsw is not installed, which computes densities from temperatures and salinities.
+            MissingExtra: If temperatures are given, and the package gsw, which computes the densities, is not installed.
 
         Examples:
             >>> import lgvi_warp as lw
@@ -155,7 +155,7 @@ class DensityProfile(Term):
 
         Args:
             numbers: The term's numbers by field, each of shape (n, ...).
-            reference: rho0, (n,) [kg/m3].
+            reference: Density rho0 of the environment, (n,) [kg/m3].
 
         Returns:
             The rows (n, rows), and the number of knots after the first.
@@ -174,7 +174,7 @@ class DensityProfile(Term):
 
         Args:
             numbers: The term's numbers by field, each of shape (n, ...).
-            reference: rho0, (n,) [kg/m3].
+            reference: Density rho0 of the environment, (n,) [kg/m3].
             depth: Depths (k, n) [m].
 
         Returns:

@@ -36,16 +36,16 @@ LIGHT = 0.1
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class MovingMass(Term):
-    """A mass in the vehicle that moves along a path, by commands, or both: a sliding and rolling battery, a trim weight.
+    """A mass in the vehicle, such as a battery or a trim weight, that moves along a path, by commands, or in both ways.
 
     The vehicle's mass, inertia and center of gravity must include this mass at its reference position r0. At the position r
-    its weight adds the torque (r - r0) x m g R^T e3. A path is linear between its times, and holds its ends. If `inertia`
-    is True, Runge-Kutta methods use the vehicle's inertia with the mass at its present position, and the vehicle recoils as
-    the mass moves.
+    its weight adds the torque (r - r0) x m g R^T e3, where R^T e3 is the downward vertical in body axes. A path is linear
+    between its times, and constant before the first and after the last. If `inertia` is True, Runge-Kutta methods use the
+    vehicle's inertia with the mass at its present position, and the vehicle recoils as the mass moves.
 
-    A controller commands up to two channels n: the distance by which the mass slides from the path [m], and the angle by
-    which the mass and its slide direction turn about an axis [rad]. n' = (command - n) / time constant, with |n'| at most
-    the rate limit and the command within the limit. Both channels are 0 at the start and without a controller.
+    A controller commands up to two channels: the distance by which the mass slides from the path [m], and the angle by
+    which the mass and its slide direction turn about an axis [rad]. A channel n follows n' = (command - n) / time constant,
+    with |n'| at most the rate limit and the command within the limit. Channels are 0 at the start and without a controller.
 
     Args:
         mass: Mass m [kg].
@@ -62,9 +62,9 @@ class MovingMass(Term):
             if the mass exceeds a tenth of the vehicle's mass.
 
     Raises:
-        SceneError: If times do not rise or are missing, a direction has length 0, numbers of channels are given without
-            channels, or a number is invalid (see `Term`). A scene refuses the mass if its vehicle cannot include it at the
-            reference position.
+        SceneError: If times do not rise or are missing, a direction has length 0, limits or time constants are given
+            without channels, or a number is invalid (see `Term`). A scene refuses the mass if its vehicle cannot include
+            the mass at the reference position.
 
     Examples:
         >>> import lgvi_warp as lw

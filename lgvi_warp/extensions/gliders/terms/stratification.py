@@ -15,14 +15,14 @@ from lgvi_warp.physics.terms.base import CONSERVED, Array, Numbers, Packed, Pack
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Stratification(Term):
-    """Buoyancy that varies with depth: B (1 + gradient x) (1 - compressibility x), x = d - reference_depth.
+    """Buoyancy that varies with depth: B (1 + gradient x) (1 - compressibility x), where x = d - reference_depth.
 
-    B is the vehicle's buoyancy, and d the depth of the centre of buoyancy.
+    B is the vehicle's buoyancy, and d is the depth of the centre of buoyancy.
 
     Args:
         gradient: Relative change of buoyancy per depth [1/m], positive if denser water lies below. With `compressibility`,
-            it is the change due to the water alone. Without `compressibility`, it is the net change due to the water and
-            the hull's volume.
+            give the change due to the water alone. Without `compressibility`, give the net change due to the water and the
+            hull's volume.
         reference_depth: Depth [m] at which the buoyancy is B; 0 by default.
         compressibility: Relative loss of the hull's volume per depth [1/m] (Eriksen et al. 2001); none by default.
 

@@ -36,14 +36,14 @@ class SurfaceBuoyancy(Term):
         stations: Positions along the body's x axis, (k,) [m], rising, from stern to bow. Only their distances count, since
             the centroid of the volume is placed at the centre of buoyancy. With one station, the default, the hull is one
             part: the surface affects its heave but not its pitch.
-        section: "circle", the default, for a round hull, whose sections grow as the square of the height; or "box", for
-            vertical sides, whose sections grow as the height.
+        section: "circle", the default, for a round hull, whose sectional area grows as the square of the height; or "box",
+            for vertical sides, whose sectional area grows as the height.
 
     Raises:
         SceneError: If stations do not rise, two neighbouring heights are 0, or a number is invalid (see `Term`).
 
     Examples:
-        A ball with a weight of 80 N and a buoyancy of 100 N if submerged.
+        A ball of 80 N floats, since its buoyancy is 100 N when it is submerged.
 
         >>> import lgvi_warp as lw
         >>> ball = lw.Vehicle(8.0, inertia=[0.1, 0.1, 0.1], added_mass=[4.0, 4.0, 4.0], buoyancy=100.0)
@@ -118,7 +118,8 @@ class SurfaceBuoyancy(Term):
 
         Returns:
             (n, parts, 6): position relative to the centre of buoyancy [m], buoyancy [N], half-height [m] and its inverse, and
-            `tilt` and `stretch` of the vertical extent c H, with c^2 = 1 - tilt a^2 + stretch a^4, a the sine of the pitch.
+            `tilt` and `stretch`. A section of height H has the vertical extent c H, where c^2 = 1 - tilt a^2 + stretch a^4 and
+            a is the sine of the pitch.
         """
         x, heights, buoyancy = numbers["stations"], numbers["heights"], buoyancy[:, None]
         if x.shape[1] == 1:

@@ -33,9 +33,11 @@ class DVL(MeasuringPart):
         reading_i = u_i . (nu + Omega x place) + noise xi_i
         u_i = (+-sin(angle) / sqrt(2), +-sin(angle) / sqrt(2), cos(angle))
 
+    u_i: direction of beam i in body axes, nu and Omega: velocity over ground and angular velocity, xi_i: standard normals.
+
     A beam has no echo if it is lost by chance, points upward, or has no floor (flat or on a grid) within its range, or if
-    the body is tilted too far. An `error_state_filter` uses each beam separately, so even a single beam helps. Without a
-    filter, the measured velocity is the velocity of the point `place`, by least squares from three or four beams. With
+    the tilt exceeds `greatest_tilt`. An `error_state_filter` uses each beam separately, so even a single beam helps. Without
+    a filter, the measured velocity is the velocity of the point `place`, by least squares from three or four beams. With
     fewer beams there is no bottom lock, and the last velocity is kept; it is 0 before the first lock.
 
     Args:
@@ -47,14 +49,14 @@ class DVL(MeasuringPart):
             independent.
         outlier: Probability that the reading of a beam is an outlier, independently for each beam; by default no outliers.
         outlier_std: Standard deviation of the error that an outlier adds to the reading [m/s].
-        every: Ticks from one new reading to the next, a whole number; 1 by default.
+        every: Number of ticks from one new reading to the next, a whole number; 1 by default.
         floor: Key of the scene's `lw.events.Floor` that reflects the beams; with "", the default, every beam has an echo.
         least_range: Shortest distance along a beam to the floor [m]; 0 by default.
         greatest_tilt: Largest angle of the body's third axis from straight down at which beams have echoes [rad]; by default
             there is no limit.
         greatest_range: Longest distance along a beam to the floor [m]; inf by default.
-        silent_from: Time from which the log gives no readings [s]; inf by default, for never.
-        silent_to: Time until which the log gives no readings [s]; inf by default, for the end of the run.
+        silent_from: Time from which the log gives no readings [s]; inf, the default, for never.
+        silent_to: Time until which the log gives no readings [s]; inf, the default, for the end of the run.
 
     Raises:
         SceneError: If `every` is not a whole number, the range or the silent time ends before it begins, or a number is

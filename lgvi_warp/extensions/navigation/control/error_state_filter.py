@@ -52,7 +52,7 @@ class ErrorStateFilter(MeasuringPart):
     """An error-state Kalman filter of 15 states: position, velocity, attitude, biases of accelerometers and gyroscopes.
 
     List it after the sensors that it names. These sensors pass their readings only to the filter. The filter replaces the
-    measured position, attitude, velocity over ground and angular velocity by its estimate. At each tick the IMU's
+    measured position, attitude, velocity over ground and angular velocity by its estimates. At each tick the IMU's
     increments propagate the estimate. Then each new reading updates it, number by number in Joseph's form. A delayed fix
     updates a copy of the position and its covariances made when the fix was taken (stochastic cloning); up to 8 fixes may
     be pending. For all members, the filter assumes the sensor noise of the scene, times `process_scale` and
@@ -64,25 +64,25 @@ class ErrorStateFilter(MeasuringPart):
 
     Args:
         imu: Key of an `IMU`; "imu" by default.
-        dvl: Key of a `DVL`; "", the default, for none. The following keys are "" by default, too.
+        dvl: Key of a `DVL`; "", the default, for none. The next four keys are "" by default, too.
         depth: Key of a `Sensor` of "depth".
         heading: Key of a `Sensor` of "heading".
         fix: Key of a `Sensor` of "position" without latency, such as GPS with `deepest`.
         delayed_fix: Key of a `Sensor` of "position" whose `latency` is below 8 times its `every`, such as USBL. If a
             member's numbers give more pending fixes than the scene's numbers, the filter ignores the excess.
-        position_sigma: Standard deviation of the first position (3,) [m], inertial axes, or one number for all axes; 1 by
-            default.
-        velocity_sigma: Standard deviation of the first velocity (3,) [m/s], inertial axes; 0.1 by default.
-        attitude_sigma: Standard deviation of the first attitude (3,) [rad], body axes; 0.02 by default.
+        position_sigma: Standard deviation of the first position error (3,) [m], inertial axes, or one number for all axes; 1
+            by default.
+        velocity_sigma: Standard deviation of the first velocity error (3,) [m/s], inertial axes; 0.1 by default.
+        attitude_sigma: Standard deviation of the first attitude error (3,) [rad], body axes; 0.02 by default.
         accelerometer_sigma: Standard deviation of the accelerometers' bias (3,) [m/s^2], whose first estimate is 0; 0.02 by
             default.
         gyroscope_sigma: Standard deviation of the gyroscopes' bias (3,) [rad/s], whose first estimate is 0; 1e-3 by default.
         start_error: Factor on the error of the first position, velocity and attitude; 1 by default, 0 for the truth.
         process_scale: Factor on the IMU's noise and bias walk that the filter assumes; 1 by default.
         measurement_scale: Factor on the noise of the other sensors that the filter assumes; 1 by default.
-        gate: Largest innovation that is accepted, in its standard deviations, for each number of a reading separately, such
-            as a beam or a coordinate of a fix. Give one number, or five (5,), for dvl, fix, delayed_fix, depth and heading;
-            inf accepts all. By default there is no gate.
+        gate: Largest accepted innovation, divided by its standard deviation, for each number of a reading separately, such as
+            a beam or a coordinate of a fix. Give one number, or five (5,), for dvl, fix, delayed_fix, depth and heading; inf
+            accepts all. By default there is no gate.
         most_rejected: Number of consecutive rejections of one number after which the next reading is accepted. The
             covariance is first enlarged along the measured direction, until the innovation is at the gate. 10 by default,
             inf for never.
@@ -158,7 +158,7 @@ class ErrorStateFilter(MeasuringPart):
 
     @property
     def rejected_rows(self) -> int:  # type: ignore[override]
-        """Number of these rows that count rejected readings, by sensor."""
+        """Number of rows of the bus that count rejected readings, by sensor."""
         return len(AIDS) if self.report and self.gate is not None else 0
 
     @property

@@ -67,7 +67,7 @@ def assimilate(
 ) -> Assimilated:
     """Assimilate measurements: correct the members of a fleet by measured series, and estimate numbers of the scene.
 
-    The members are the prior: their initial states and numbers vary by the uncertainty before the first measurement. They
+    The members are the prior: the distribution of their initial states and numbers before the first measurement. They
     run to each time of the series, where a filter updates them by the measured values. The memory of actuators and
     controllers is not updated.
 
@@ -79,23 +79,23 @@ def assimilate(
     Args:
         fleet: An Ensemble, or a Scene with its [ensemble], of tens to thousands of members.
         series: One or several lw.studies.Series, the measurements of the instruments.
-        learn: Names of varied numbers to estimate, such as ["current.velocity[0]"]; default none.
+        learn: Names of varied numbers to estimate, such as ["current.velocity[0]"]; by default none.
         filter: "etkf", the default, is an ensemble Kalman filter without random draws (Bishop, Etherton & Majumdar 2001).
             "enkf" perturbs the measurement for each member (Burgers, van Leeuwen & Evensen 1998). Both have no localisation
             and suit spreads that are small enough for nearly linear motion. "particles" is a particle filter with systematic
             resampling (Kitagawa 1996), for any spread.
         method: As in `lw.solve`.
-        h: Step [s], which divides every time of the series; default that of the scene.
+        h: Step [s], which divides every time of the series; by default the scene's step.
         dtype: As in `lw.solve`.
         seed: Seed of the filter's random draws.
         discount: With particles and learned numbers, these numbers and the states are redrawn at each resampling with
             unchanged mean and covariance (Liu & West 2001). Give a number between 1/3 and 1, or None for no redrawing; 0.99
             by default.
-        gate: Largest distance of a value from its prediction, in standard deviations of the innovation; values beyond it are
-            left out, with a message. For several values of one instrument, a chi-square test of the same probability is
+        gate: Largest accepted distance of a value from its prediction, in standard deviations of the innovation. Other values
+            are left out, with a message. For several values of one instrument, a chi-square test of the same probability is
             used. None accepts all values; 5.0 by default.
         inflation: Factor on the covariance of the members before each measurement, at least 1 (default), for Kalman filters
-            that become overconfident; or "adaptive", which estimates it from the innovations (Anderson 2009, Miyoshi 2011).
+            that become overconfident; or "adaptive" to estimate it from the innovations (Anderson 2009, Miyoshi 2011).
         threads: As in `lw.solve`.
         progress: As in `lw.solve`.
 

@@ -29,8 +29,8 @@ class BottomContact(Term):
     """Contact of hull points with a floor whose `contact` is "rest": springs, dampers and dry friction.
 
     The floor pushes a point at the depth d below it with the force stiffness * d + damping * (speed into the floor), and
-    never pulls. Along the floor, a spring and a damper hold the point with a force of at most friction times this push;
-    beyond it, the point slides. A vehicle at rest stays at rest.
+    never pulls. Along the floor, a spring and a damper hold the point with a force of at most friction times this push; if
+    more were needed, the point slides. A vehicle at rest stays at rest.
 
     The step h limits stiffness and damping. At these limits, the phase of the vehicle's fastest oscillation on all its
     points advances by 1 rad in a step, and its speed decays within one step. The limits are the defaults, so a shorter step
@@ -40,8 +40,9 @@ class BottomContact(Term):
         points: Points of the hull that may touch the floor, (k, 3) [m] from the body's origin.
         friction: Coefficient of friction, the tangent of the friction cone's angle; 0.5 by default.
         stiffness: Stiffness of the floor at each point [N/m]; by default the limit for the step.
-        damping: Damping at each point [N s/m]; by default the limit for the step, but enough that no bounce gains energy.
-        floor: Name of the floor; "" by default, for the only one whose `contact` is "rest".
+        damping: Damping at each point [N s/m]; by default critical damping. The step sets an upper bound, and a lower bound
+            that lets no bounce gain energy.
+        floor: Name of the floor; "", the default, stands for the only floor whose `contact` is "rest".
 
     Raises:
         SceneError: If a number is invalid (see `Term`). A scene refuses this term if it has no such floor, or several such

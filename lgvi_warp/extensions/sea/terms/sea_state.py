@@ -34,7 +34,7 @@ class SeaState(WaveTerm):
     """A random sea with a significant height and a peak period, as a sum of linear waves of equal energy (Goda 2010).
 
     Every member has its own sea. The frequency of each wave is drawn within its share of the spectrum, so that the surface
-    does not repeat in time. Phases and headings are drawn, too.
+    does not repeat in time. Phases are drawn, too, and headings if the sea has a `spreading`.
 
     Args:
         significant_height: Significant wave height Hs [m], 4 times the standard deviation of the surface.
@@ -49,13 +49,13 @@ class SeaState(WaveTerm):
         amplitudes: "equal", the default, for exactly Hs in every member; or "rayleigh", for random amplitudes as in a section
             of a long record.
         components: Number of waves; 20 by default.
-        depth: Depth of the sea [m]; by default that of the scene's floor if it is flat, else the water is deep.
+        depth: Depth of the sea [m]; by default the depth of the scene's flat floor. Without such a floor the water is deep.
         periods_of: Frame of the periods in a uniform current: "ground", the default, as measured by a moored buoy; or
             "water", as measured by a buoy that drifts with the current.
         seed: Seed, a whole number from 0, of a sea that all members share. None, the default: each member has its own sea,
-            from the seed of the ensemble.
-        levels: Uniform random numbers in (0, 1) that determine the frequency, the phase and, if random, the heading and
-            amplitude of each wave, (components, 2 to 4); by default they are drawn.
+            drawn with the seed of the ensemble.
+        levels: Uniform random numbers in (0, 1) that determine the frequency, the phase and, if these are random, the heading
+            and amplitude of each wave, (components, 2 to 4); by default they are drawn.
 
     Methods:
         density: The spectrum of the surface.

@@ -32,7 +32,7 @@ class Tide(SurfaceLevel):
         amplitudes: Amplitudes of the constituents, (k,) [m].
         periods: Periods of the constituents, (k,) [s], above 0; or give `speeds`.
         speeds: Speeds of the constituents, (k,) [deg/h], above 0: M2 28.984, S2 30, K1 15.041, O1 13.943.
-        phases: Phases of the constituents at t = 0, (k,) [rad]; 0 by default. A phase lag g at t = 0 is the phase -g.
+        phases: Phases of the constituents at t = 0, (k,) [rad]; 0 by default. For a phase lag g at t = 0, give -g.
         times: Times of a table, (m,) [s], rising.
         heights: Heights at these times, (m,) [m], added to the constituents; linear between the times, constant outside.
         mean: Height of the mean surface above the depth 0 [m], for example if the depths of a chart are relative to the

@@ -141,9 +141,8 @@ def linearize(
 
     Args:
         scene: The scene, without waves and noise; or an Ensemble, whose scene is used.
-        about: Motion to linearise about: the result of `lw.linear.trim`; or, for a closed loop, a time [s] at which a
-            run has this motion. None, the default: the start with commands of 0; for a closed loop, the motion after
-            one period.
+        about: Motion to linearise about: a result of `lw.linear.trim`; or, in a closed loop, a time [s] of a run. None,
+            the default: the start with commands of 0; in a closed loop the motion after one period.
         inputs: "commands" of the actuators, the default; or, for a plant only, "wrench": X, Y, Z [N], K, M, N [N m] in
             body axes about the body's origin, held for a period. The actuators then keep their commands.
         closed: True includes the controller in the model; the inputs are then added to its commands. Default False.

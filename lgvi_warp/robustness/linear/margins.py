@@ -275,8 +275,7 @@ def margins(
     A member's loop is examined about its motion after `about` seconds. This motion must be steady: over one period,
     velocities, rates, the vertical, commands and quantities held at a set-point change by less than 1e-6, and no
     command is at its limit. Until then the time is doubled, up to `settle`. A run that starts from the motion, turned
-    by `tilt`, must return to it. If one of these conditions fails, the member has no margins, and `why` names the
-    condition.
+    by `tilt`, must return to it. If one of these conditions fails, the member has no margins; see `why`.
 
     By eigenvalues: margins follow from the eigenvalues of the linearised sampled loop about that motion. The loop is
     affine in the factor on the law's demand, and each delay within a period is linearised, so bisection needs no runs.

@@ -187,10 +187,9 @@ def loop(
 
     Args:
         fleet: An Ensemble, or a Scene whose [ensemble] is used; without waves and noise of the water.
-        at: Place at which to open the loop: the key of a law, such as "heading_pid", for all components of its demand;
-            "X", "Y", "Z", "K", "M" or "N", for one component of all laws' demand; a command, such as "control_fins[0]";
-            or an actuator, such as "control_fins", for all its commands. None, the default: the whole demand of all
-            laws.
+        at: Place at which to open the loop: key of a law, such as "heading_pid" (all components of its demand); "X",
+            "Y", "Z", "K", "M" or "N" (one component of all laws' demand); a command, such as "control_fins[0]"; or an
+            actuator, such as "control_fins" (all its commands). None, the default: the whole demand of all laws.
         about: Time at which the loop is examined [s]; 60 by default.
         settle: Time by which a member must be steady [s]; 1200 by default.
         method: As in `lw.solve`; the scene's method by default.

@@ -125,9 +125,8 @@ def trim(
     Args:
         scene: The scene, or an Ensemble, whose scene is used.
         speed: Speed over ground [m/s]; None, the default: the speed is free, as for a propeller with constant thrust.
-        free: Names of quantities that may be chosen: "roll", "pitch", "drift" (course minus heading), "speed",
-            commands, such as "thrusters[0]", or "thrusters" for all commands of the term. None, the default: all that
-            are not fixed.
+        free: Names of free quantities: "roll", "pitch", "drift" (course minus heading), "speed", commands, such as
+            "thrusters[0]", or "thrusters" for all commands of the term. None, the default: all that are not fixed.
         fixed: Values of other quantities by name; None by default. A quantity neither free nor fixed is 0.
         method: As in `lw.solve`; the scene's method by default.
         h: Step [s]; the scene's step by default.

@@ -132,8 +132,7 @@ def worst_case(
             302.0)}; or (low, high, "log") to search on a logarithmic scale.
         of: A quantity with one number, as in `lw.prepare`: "max(depth)", a Quantity, a function of a Result; or a
             metric, as in `lw.sweep`: "overshoot depth", lw.metrics.SettlingTime("depth", within=0.5).
-        worst: Which value is worst: "largest", the default, or "smallest". A failed member is the worst and ends the
-            search.
+        worst: Worst value: "largest", the default, or "smallest". A failed member is worst of all and ends the search.
         budget: Number of members that may be run; 20,000 by default.
         restarts: Number of evolutions; 3 by default. A small budget allows fewer.
         seed: Seed of the search; 0 by default.

@@ -146,9 +146,8 @@ class Sweep(SweepTable):
     def compare_rare(self, first: str, second: str, at: Mapping[str, Any] | None = None) -> list[RareComparison]:
         """Compare the rare failures of two cases at each point of the grid: ratio of their failure probabilities.
 
-        Failing members of each case also run in the other, with the same numbers and noise. If A, B are the failures of
-        the first and second case, P(B) / P(A) = P(B | A) / P(A | B). If too few fail in both, the ratio of the
-        estimates is used.
+        Failing members of each case, A and B, also run in the other, with the same numbers and noise: P(B) / P(A) = P(B
+        | A) / P(A | B). If too few fail in both, the two estimates are divided. Holm's method corrects the p-values.
 
         Args:
             first: name of a case.

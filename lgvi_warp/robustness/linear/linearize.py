@@ -33,9 +33,8 @@ INPUTS = ("commands", "wrench")
 class LinearModel:
     """Discrete linear model of deviations from a motion: x' = A x + B u, y = C x + D u.
 
-    x: n states; x': states one period later; u: m inputs, held for a period; y: 12 outputs: position [m] (inertial
-        axes), rotation vector [rad], velocity [m/s], angular velocity [rad/s] (body axes). These are also the first 12
-        states. The memory of actuators and control parts follows.
+    x: n states; x': one period later; u: m inputs; y: the first 12 states: position [m, inertial axes], rotation vector
+    [rad], velocity [m/s], angular velocity [rad/s] (body axes). Memory of actuators and control parts follows.
 
     Attributes:
         A: state matrix (n, n).

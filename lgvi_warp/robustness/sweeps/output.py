@@ -85,8 +85,8 @@ class Sweep(SweepTable):
         """Compare two cases on the same members: their success and each metric, at each point of the grid.
 
         Success: difference of paired proportions, with Tango's interval and McNemar's exact test. Metrics: paired t
-            test, or bootstrap for a quantile, over members with finite numbers that failed in neither case. Holm's
-            method corrects the p-values for the number of comparisons. See docs/guide/is_my_controller_robust.md.
+        test, or bootstrap for a quantile, over members with finite numbers that failed in neither case. Holm's method
+        corrects the p-values for the number of comparisons. See docs/guide/is_my_controller_robust.md.
 
         Args:
             first: name of a case.
@@ -223,8 +223,8 @@ class Sweep(SweepTable):
         """Find which of the varied inputs explain success or a metric, the most important first.
 
         share: fraction of the variance over members that this input alone explains, estimated by bins of the members,
-            with an interval and the p-value p of an F test. Holm's method corrects p for the number of inputs. slope:
-            standardised coefficient of a linear regression on all inputs. Inputs should be independent.
+        with an interval and the p-value p of an F test. Holm's method corrects p for the number of inputs. slope:
+        standardised coefficient of a linear regression on all inputs. Inputs should be independent.
 
         Args:
             case: name of the case.

@@ -148,7 +148,7 @@ def _labels(space: Space, name: str) -> list[str]:
 
 @dataclass(frozen=True)
 class Morris(Sampling):
-    """Morris's screening design (SALib.sample.morris): paths of d + 1 members for d factors; each step changes one factor.
+    """Morris's screening design (SALib.sample.morris): paths of d + 1 members, d factors; each step changes one factor.
 
     Each side of the unit cube is divided into equal parts, and members lie in the middle of parts, so that unbounded
     distributions give finite values. More paths can be added. The design needs SALib (extra: uq). Morris (1991),

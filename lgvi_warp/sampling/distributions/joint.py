@@ -350,10 +350,10 @@ class PhysicalInertia(PositiveDefinite):
     """Distribution of physically possible inertias J: no principal inertia exceeds the sum of the other two.
 
     The second moments of mass are S = tr(J) / 2 - J. `PositiveDefinite` draws S, and the inertia is J = tr(S) - S. A
-    mass distribution with inertia J exists if and only if S is positive definite (Wensing, Kim & Slotine 2018,
-    Linear matrix inequalities for physically consistent inertial parameter identification). Use it for
-    "vehicle.inertia", whose scene value must be physical, or for "vehicle.rigid_body_mass_matrix". For the latter, S is
-    taken about the centre of gravity, which stays fixed.
+    mass distribution with inertia J exists if and only if S is positive definite (Wensing, Kim & Slotine 2018, Linear
+    matrix inequalities for physically consistent inertial parameter identification). Use it for "vehicle.inertia",
+    whose scene value must be physical, or for "vehicle.rigid_body_mass_matrix". For the latter, S is taken about the
+    centre of gravity, which stays fixed.
 
     Args:
         sigma: Standard deviation of the logarithm of the principal second moments, one number or (3,).

@@ -22,7 +22,7 @@ class Region:
     Attributes:
         share: Share of the members, as a fraction.
         area: Area [m2]; NaN if all positions are at one point or on a line.
-        low, high: 95 % interval of the area [m2]; high is infinite if the members are too few to bound it.
+        low, high: 95 % interval of the area [m2]; high is infinite if there are too few members to bound the area.
         radius: Radius of the circle about the centre that contains the share [m].
         ellipse_area: Area of the ellipse that would contain the share if the positions were normally distributed [m2].
         polygons: Parts of the region. Each is a tuple of rings (k, 2), north and east [m]: the outline, then its holes.

@@ -60,7 +60,7 @@ class RareEvent(Saved):
         provenance: scene, distributions, settings, versions and machine.
         paths: with splitting, (times (j + 1,) [s], indices (j,)) of each failing member: between successive times it
             has the noise of this index and of the call's seed, as in `run.states(final, indices=, seed=)`.
-        moved_size: name -> mean distance of failing members from the middle, in standard deviations; 0.80 over all members.
+        moved_size: name -> mean distance of failing members from the middle, in standard deviations; all members: 0.80.
         moved_spread: name -> standard deviation of the failing members divided by that of all members.
         moved_z: name -> z-score farthest from 0 of these three differences from all members; significant from 4.5 on.
         by_condition: for an event of several conditions, text of each condition, and "any" and "all" -> (probability,

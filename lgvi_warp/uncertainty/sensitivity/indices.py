@@ -29,7 +29,7 @@ class Indices(Saved):
         samples: number of groups or paths of the design, or of members of given data, that were used.
         members: number of members that were run.
         failed: number of members that failed.
-        confidence: level of the intervals; fields named ..._confidence hold their half widths.
+        confidence: level of the intervals; fields named ..._confidence hold the half widths of intervals.
         messages: notes for the user.
         provenance: scene, settings, versions and machine of the runs.
     """

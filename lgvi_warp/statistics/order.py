@@ -97,7 +97,7 @@ class Quantiles(Statistic):
     """Quantiles over members: exact for up to `size` members, for more members from a sketch with a proven error bound.
 
     Interval: from the ranks of the sorted values (binomial, for any distribution), widened by the sketch's standard
-    error. It is infinite if too few members lie beyond the level. Each replicate has its own sketch.
+    error. The interval is infinite if too few members lie beyond the level. Each replicate has its own sketch.
 
     Arrays of the estimate, in addition to lower, upper and count (k,), for k sample times and d components:
 

@@ -41,7 +41,7 @@ class Regulator:
             name: Name of the law in the controller; by default its type, "state_feedback".
 
         Returns:
-            The law. Its attitude gains are corrected, since it uses another velocity error than the model's deviation.
+            The law. Its attitude gains allow for the law's velocity error, which differs from the model's deviation.
 
         Raises:
             SceneError: If an input is not a component of a wrench, or a state is not a coordinate of the motion.

@@ -293,8 +293,8 @@ def margins(
 
     The phase margin is the smallest phase shift, lag or lead, of all components of the law's demand that makes the loop
     unstable. For one component it follows from the crossovers of the gain; for several, from the crossovers of the
-    characteristic loci of the sampled loop (MacFarlane, Postlethwaite 1977, Int. J. Control 25(1)). It is infinite if
-    no gain crosses 1 between 1e-5 of the Nyquist frequency and the Nyquist frequency.
+    characteristic loci of the sampled loop (MacFarlane, Postlethwaite 1977, Int. J. Control 25(1)). The margin is
+    infinite if no gain crosses 1 between 1e-5 of the Nyquist frequency and the Nyquist frequency.
 
     The disk margin is computed for the sampled loop, opened at all components of the law's demand. The loop remains
     stable if each component has its own complex factor, at any frequency, in the disk (1 + (1 - skew) d / 2) / (1 - (1
@@ -303,8 +303,8 @@ def margins(
 
     A peak gain is the largest gain over frequency from a disturbance of the law's demand to an output: the total demand
     (S, the sensitivity), the law's response (T), or a number of the motion in `to`, per unit of the demand. With
-    several components the gain is the largest singular value, so the peak is the H-infinity norm. It is infinite if the
-    gain grows towards frequency 0. The largest peak of all members is the worst-case gain of the ensemble.
+    several components the gain is the largest singular value, and the peak is the H-infinity norm. The peak is infinite
+    if the gain grows towards frequency 0. The largest peak of all members is the ensemble's worst-case gain.
 
     Args:
         fleet: An Ensemble, or a Scene whose [ensemble] is used; without waves and noise.

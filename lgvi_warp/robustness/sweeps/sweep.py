@@ -85,7 +85,7 @@ def sweep(
             metrics, {"success": 1.0, "overshoot depth": 0.1}, metrics in their units. A comparison then has a verdict:
             better or worse (by more than this difference), equivalent (the interval lies within it) or undecided. A
             smaller metric is better, unless `success` gives it only a lower limit. By default None.
-        rare: True estimates the probability that a member does not pass by lw.rare_event, even if it is very small, in
+        rare: True estimates by lw.rare_event the probability that a member does not pass, even a very small one, in
             every cell whose case does not set `rare`; or a dict with some arguments of lw.rare_event,
             {"relative_error": 0.2, "cheaper": [{"h": 0.1}], "most": 200_000}. To compare two cells, the failing members
             of each are also run in the other. None (default): only in cells whose case sets `rare`.

@@ -69,7 +69,7 @@ class Saltelli(Sampling):
         return content
 
     def factors(self, space: Space) -> Factors:
-        """Label and columns of each factor; several factors that form one are at the place of the first of them.
+        """Label and columns of each factor; a group of factors has the place of its first factor.
 
         Args:
             space: The unit cube: the varied names with their numbers of columns.

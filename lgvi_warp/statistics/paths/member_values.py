@@ -20,9 +20,9 @@ from lgvi_warp.statistics.values.values import Values
 class MemberValues(Statistic):
     """The numbers of all members, in the order of the members: eight bytes per member, component and row.
 
-    It is mostly used in `then` of another statistic, which has one row: lw.metrics.Overshoot("depth",
-    then=[lw.statistics.Mean(), lw.statistics.MemberValues()]). For a metric it includes the numbers of failed members;
-    otherwise the number of a member that is left out is NaN. It has no interval.
+    Use it mostly in `then` of another statistic, which has one row: lw.metrics.Overshoot("depth",
+    then=[lw.statistics.Mean(), lw.statistics.MemberValues()]). The values of a metric include the numbers of failed
+    members; otherwise the number of a member that is left out is NaN. There is no interval.
 
     Arrays of the estimate, for k rows (sample times), d components and n members:
 

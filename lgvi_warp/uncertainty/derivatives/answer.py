@@ -32,8 +32,8 @@ class Derivatives(Saved):
         value: values of the quantities (m,).
         jacobian: derivative of each quantity by each number (m, k) [unit of quantity / unit of number]; NaN if undefined.
         error: estimated error of each derivative (m, k), from round-off and from the disagreement of differences at
-            several increments. It is not a bound: the true error is sometimes about 3 times as large. It excludes the
-            error of the method's step. NaN if undefined.
+            several increments. It is no bound: the true error is sometimes about 3 times as large. The error of the
+            method's step is not included. NaN if undefined.
         increments: the largest increment used for each derivative (m, k) [unit of the number]; NaN if undefined.
         undefined: "quantity by number" -> sentence that gives the reason why this derivative is undefined.
         messages: notes for the user.

@@ -71,7 +71,7 @@ def sobol(
         First-order and total indices of every factor, in the order of `vary`, and second-order indices of pairs.
 
     Raises:
-        SceneError: if arguments are faulty; one message lists all.
+        SceneError: if arguments are faulty; one message lists all faults.
         TypeError: for an argument that does not exist.
         FailedMembers: if members failed and the indices cannot be computed from the others.
 
@@ -188,7 +188,7 @@ def morris(
         Elementary effects of every factor.
 
     Raises:
-        SceneError: if arguments are faulty; one message lists all.
+        SceneError: if arguments are faulty; one message lists all faults.
         FailedMembers: if members failed and the effects cannot be computed from the others.
 
     Examples:

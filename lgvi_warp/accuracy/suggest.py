@@ -77,19 +77,19 @@ class Suggestion:
         error: requested error [`unit`].
         of: name of the quantity whose error is limited.
         unit: unit of that quantity.
-        expected: largest error over members and path [`unit`]: the largest error of the checked members, extrapolated to
-            the size of the fleet by the tail of their errors. One in ten fleets of this size and distribution exceeds it.
+        expected: expected largest error over all members of the fleet and their paths [`unit`], extrapolated from the
+            largest errors of the checked members. One in ten fleets of this size and distribution has a larger error.
         us_per_vehicle_second: microseconds of one core per vehicle and simulated second.
         run_seconds: predicted run time of all members on `threads` threads, without compiling [s].
-        threads: threads that `run_seconds` assumes.
+        threads: number of threads that `run_seconds` assumes.
         memory_bytes: predicted memory of the run and of its result [bytes].
         members: number of members that the setting was checked on.
         t1: end time of the checked runs [s].
-        reference: description of the two runs that are the reference of the errors.
+        reference: description of the two fine runs from which errors are measured.
         reference_error: largest difference between these two runs [`unit`].
-        rivals: (setting, us_per_vehicle_second, error) of each of the next best settings.
-        worst: indices of the members with the largest errors, the largest first; a later check runs them again.
-        asked: the quantity itself, for that check.
+        rivals: (setting, us_per_vehicle_second, expected error) of each of the next best settings.
+        worst: indices of the members with the largest errors, the largest first. A check of a finished run uses them.
+        asked: the quantity whose error is limited, as the object that this check needs.
         messages: notes for the user.
     """
 
@@ -114,12 +114,12 @@ class Suggestion:
 
     @property
     def margin(self) -> float:
-        """Factor by which the expected error is below the requested error; infinite if the expected error is 0."""
+        """Requested error divided by the expected error; infinite if the expected error is 0."""
         return self.error / self.expected if self.expected > 0.0 else math.inf
 
     @property
     def answer(self) -> str:
-        """The answer in one sentence; the text of `str` ends with it."""
+        """The answer in one sentence. The text of `str` ends with this sentence."""
         s, asked, expected = self.setting, *(few_digits(each, self.unit, 2) for each in (self.error, self.expected))
         chosen = f"{s.text} with step {s.h:.6g} s is the cheapest setting found"
         return f"{chosen} that keeps {self.of} to {asked} up to {self.t1:g} s: {expected} is expected."
@@ -151,22 +151,22 @@ def suggest(
     seconds: float = 30.0,
     progress: Callable[[float], None] | bool | None = None,
 ) -> Suggestion:
-    """Find the cheapest method, step and precision that keep a requested error for every member up to a time.
+    """Find the cheapest method, step and precision whose error stays below a given error in every member up to t1.
 
-    The search runs a sample of members; its best settings are then checked on up to 1024 members. A Pareto tail
-    extrapolates their largest errors to the size of the fleet; if the result is too large, the step is shortened. If
-    noise acts, all runs of the search share one noise path. It is drawn every noise_step of the scene or, without a
-    noise_step, more finely than any step that is tried. A later run with the setting draws noise at its own steps.
+    The search runs a sample of members. Its best settings are then checked on up to 1024 members. A Pareto tail
+    extrapolates these members' largest errors to the size of the fleet; if the result is too large, the step is
+    shortened. If noise acts, all runs of the search share one noise path, drawn at the scene's noise_step or, without a
+    noise_step, at a shorter interval than any step tried. A later run with the setting draws noise at its own steps.
 
     Args:
         fleet: the ensemble, or a Scene with one.
         error: largest allowed error over all members and times, in the unit of `of`; above 0. Default 1e-3.
         of: quantity whose error is limited: a name that statistics accept, such as "position" [m], "attitude" [rad],
-            "depth" [m], "position[2]" [m], "speed" [m/s] or "energy" [J]; or a lw.statistics.Quantity. Or a mean, such
-            as "mean position[0]": then its bias at the end is limited, and reported with its interval as by
+            "depth" [m], "position[2]" [m], "speed" [m/s] or "energy" [J]; or a lw.statistics.Quantity. For a mean, such
+            as "mean position[0]", the bias of the mean at t1 is limited, and reported with its interval as by
             `lw.estimate`. Default "position".
         t1: end time [s]. Default: run.duration of the scene.
-        methods: names of the methods to try. Default: a few that suit the terms of the scene; if these fail, the others.
+        methods: names of the methods to try. Default: a few that suit the scene's terms; if these fail, all others.
         members: number of members in the sample that the search runs. Default 128.
         threads: number of threads of the predicted run. Default: all threads of this machine.
         seconds: approximate processor time of the search, without compiling [s]. Default 30.
@@ -176,8 +176,8 @@ def suggest(
         The cheapest setting, its expected error, its predicted time and memory, and the next best settings.
 
     Raises:
-        SceneError: if arguments are faulty (one message lists all), if noise acts that is not a NoisyTerm, or if no
-            reference is ten times more accurate than the error. The message then gives the time up to which it is.
+        SceneError: if arguments are faulty (one message lists all faults), if a source of noise is not a NoisyTerm, or
+            if no reference is ten times more accurate than `error` up to t1; the message then suggests a shorter t1.
 
     Examples:
         >>> import lgvi_warp as lw

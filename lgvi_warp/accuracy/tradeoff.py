@@ -47,14 +47,14 @@ class Measurement:
     Attributes:
         setting: method, step, precision and solver.
         us_per_vehicle_second: microseconds of one core per vehicle and simulated second, without compiling.
-        compile_seconds: time to load its kernel, spent once per process [s].
-        errors: quantity -> {"end_max", "end_rms", "path_max", "path_rms"} over the members, in the units of
-            Tradeoff.units; empty if a member failed or the errors of members cannot be measured.
+        compile_seconds: time to compile or load the setting's kernel, spent once per process [s].
+        errors: quantity -> {"end_max": ..., "end_rms": ..., "path_max": ..., "path_rms": ...}, as in `error`, in the
+            units of Tradeoff.units; empty if a member failed or the errors of members cannot be measured.
         energy_drift: largest |E(t) - E(0)| [J]; NaN if a force of the scene supplies or removes energy.
-        biases: name, such as "position_mean" -> difference of the statistic from the reference, in standard errors.
+        biases: statistic, such as "position_mean" -> its difference from the reference's statistic, in standard errors.
         order: order of the method.
-        trusted: quantity -> True if the error is at least ten times the error of the reference.
-        cost_spread: median of the readings of the cost divided by the smallest reading, which is the cost.
+        trusted: quantity -> True if the setting's error is at least ten times the error of the reference.
+        cost_spread: median of several readings of the cost, divided by the smallest reading. The smallest is the cost.
     """
 
     setting: Candidate
@@ -72,8 +72,8 @@ class Measurement:
 
         Args:
             of: name of the quantity. Default "position".
-            kind: "end_max", "end_rms", "path_max" or "path_rms": maximum or root mean square over the members, at the
-                end or over the path. Default "path_max".
+            kind: "end_max" or "end_rms": maximum or root mean square of the members' errors at the end; "path_max" or
+                "path_rms": the same over the members and all times. Default "path_max".
 
         Returns:
             The error, in the unit of the quantity; infinite if it was not measured.
@@ -83,22 +83,22 @@ class Measurement:
 
 @dataclass(frozen=True, eq=False)
 class Tradeoff(Saved):
-    """Measurements of settings on a sample of an ensemble, from 0 to t1.
+    """Trade-off of cost and error: measurements of settings on a sample of an ensemble, from time 0 to t1.
 
     Attributes:
         measurements: one measurement for each setting that ran and did not fail.
-        of: name of the quantity that decides up to which time the reference is trusted.
+        of: name of the quantity whose error decides up to which time the reference is trusted.
         members: size of the sample.
-        t1: end time; biases are measured up to it [s].
-        until: time up to which the reference is trusted; errors of members are measured up to it [s].
-        reference: description of the reference of the errors.
-        reference_error: quantity -> the reference's own largest error up to `until`; empty where noise acts.
-        growth: growth of small differences between two starts; None where noise acts.
+        t1: end time [s]; biases are measured up to t1.
+        until: time up to which the reference is trusted [s]; errors of members are measured up to this time.
+        reference: description of the accurate runs from which errors are measured.
+        reference_error: quantity -> the reference's own largest error up to `until`; empty if errors are not measured.
+        growth: growth of small differences between two starts; None if errors are not measured.
         refused: method -> reason why it cannot run the scene.
         messages: notes for the user.
         seconds: duration of the measurement [s].
         units: quantity -> unit of its errors.
-        missing: method that the user named but that has no measurement -> reason.
+        missing: method that the user named -> reason why it has no measurement.
     """
 
     measurements: tuple[Measurement, ...]
@@ -148,8 +148,8 @@ class Tradeoff(Saved):
         """List the measurements whose error the reference can resolve, the cheapest first.
 
         Args:
-            of: name of the quantity. Default: that of the trade-off.
-            kind: "end_max", "end_rms", "path_max" or "path_rms". Default "path_max".
+            of: name of the quantity. Default: the `of` of the trade-off.
+            kind: "end_max", "end_rms", "path_max" or "path_rms", as in `Measurement.error`. Default "path_max".
 
         Returns:
             Measurements in order of rising cost.
@@ -168,8 +168,8 @@ class Tradeoff(Saved):
         """List the measurements on the Pareto front: each is more accurate than all cheaper measurements.
 
         Args:
-            of: name of the quantity. Default: that of the trade-off.
-            kind: "end_max", "end_rms", "path_max" or "path_rms". Default "path_max".
+            of: name of the quantity. Default: the `of` of the trade-off.
+            kind: "end_max", "end_rms", "path_max" or "path_rms", as in `Measurement.error`. Default "path_max".
 
         Returns:
             Measurements in order of rising cost and falling error.
@@ -247,11 +247,11 @@ def tradeoff(
 ) -> Tradeoff:
     """Measure cost and error of methods, steps, precisions and solvers on the first members of a fleet.
 
-    The cost of a step is the CPU time of the thread that runs it: the smallest of several readings, one number for all
-    step lengths of a method. The messages report readings that disagree. The reference of the errors is two independent
-    runs that agree to a tenth of the smallest error shown. If noise acts, all runs share one noise path. It is drawn
-    every noise_step of the scene or, without a noise_step, more finely than any step that is tried. If no path can be
-    shared, or it is too rough for errors of members, statistics are compared with those of the finest run.
+    The cost of a step is the smallest of several readings of its thread's CPU time; all step lengths of a method share
+    it. A message reports readings that disagree. Errors are measured from one of two fine runs, which agree to a tenth
+    of the smallest error shown. If noise acts, all runs share one noise path, drawn at the scene's noise_step or,
+    without a noise_step, at a shorter interval than any step tried. If no path can be shared, or the path is too rough
+    for errors of members, only statistics are compared, with the statistics of the finest run.
 
     Args:
         fleet: the ensemble, or a Scene with one.
@@ -259,18 +259,18 @@ def tradeoff(
         of: quantity whose error decides whether the reference is accepted: a name that statistics accept ("position",
             "attitude", "depth", "position[2]", "speed", "euler", ...), or a lw.statistics.Quantity. Errors of position,
             attitude, velocity, angular_velocity and energy are always measured. Default "position".
-        methods: names of the methods to try. `missing` lists methods without any measurement. Default: all that fit the
-            scene.
+        methods: names of the methods to try. `missing` of the result lists named methods without a measurement.
+            Default: all methods that can run the scene.
         members: number of members in the sample. Default 128.
-        seconds: processor time to spend [s]; compiling kernels may take as much again. Every method first runs one
-            coarse setting; then each step is halved in turn. The messages list what is left out. Default 45.
+        seconds: processor time to spend [s]; compiling kernels may take as long again. Every method first runs with one
+            coarse step; then the steps are halved in turn. The messages list what is left out. Default 45.
         progress: True shows a bar or lines, as in lw.solve; a function is called with the completed fraction, from 0 to 1.
 
     Returns:
         Measurements of every setting, with their Pareto front.
 
     Raises:
-        SceneError: if arguments are faulty (one message lists all), or if no reference can be found.
+        SceneError: if arguments are faulty (one message lists all faults), or if no reference can be found.
 
     Examples:
         >>> import lgvi_warp as lw

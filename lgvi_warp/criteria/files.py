@@ -77,16 +77,16 @@ class Saved(ABC):
 
     Attributes:
         study: name of the study, and of its files.
-        endings: endings of its files, in the order of writing; the "txt" file has the text of `str`.
+        endings: endings of the names of its files, in the order of writing. The "txt" file has the text of `str`.
 
     Methods:
         save: Write the files into a folder.
         load: Read the answer from the JSON file.
-        rows: Records of the CSV file.
+        rows: List the records of the CSV file.
         to_csv: Write only the CSV file.
         to_json: Convert the answer to a JSON text.
-        to_dict: Convert the answer to the content of the JSON file.
-        from_dict: Build the answer from this content.
+        to_dict: Convert the answer to a dict with the content of the JSON file.
+        from_dict: Build the answer from such a dict.
     """
 
     def __init_subclass__(cls) -> None:
@@ -99,13 +99,13 @@ class Saved(ABC):
     @property
     @abstractmethod
     def answer(self) -> str:
-        """The answer in one sentence, which repeats the question; the text of `str` ends with it."""
+        """The answer in one sentence, which repeats the question. The text of `str` ends with this sentence."""
 
     def to_dict(self) -> dict[str, Any]:
         """Convert the answer to plain types for JSON.
 
         Returns:
-            A dict with the answer in one sentence and the content. Numbers that are not finite are None.
+            A dict with the fields of the answer, and the answer in one sentence. Numbers that are not finite are None.
         """
         return {"answer": self.answer} | self._content()
 
@@ -132,7 +132,7 @@ class Saved(ABC):
         """Convert the answer to a JSON text.
 
         Returns:
-            The text of `to_dict`; numbers that are not finite are null.
+            The dict of `to_dict` as JSON. Numbers that are not finite are null.
         """
         return json.dumps(self.to_dict(), indent=1)
 
@@ -161,7 +161,7 @@ class Saved(ABC):
             Paths of the files.
 
         Raises:
-            OSError: if they cannot be written.
+            OSError: if the files cannot be written.
         """
         target = path_of("folder", folder)
         name = self.study if among(name, ("",)) else str(path_of("name", name))
@@ -178,10 +178,10 @@ class Saved(ABC):
         """Build the answer from the content of a JSON file.
 
         Args:
-            content: dict as returned by `to_dict`; the sentence of the answer is derived again.
+            content: dict as returned by `to_dict`. Its answer in one sentence is not read, but derived again.
 
         Returns:
-            The answer of the study; None is read back as infinite or NaN.
+            The answer of the study. A number that is None in the dict becomes infinite or NaN, depending on the field.
         """
         return cls._of_content({name: value for name, value in content.items() if name != "answer"})
 
@@ -195,14 +195,14 @@ class Saved(ABC):
         """Read the answer from the JSON file that `save` wrote.
 
         Args:
-            path: path of the file, or of its folder.
+            path: path of the JSON file, or of the folder into which `save` wrote it.
 
         Returns:
             The answer of the study.
 
         Raises:
             OSError: if the file cannot be read.
-            SceneError: if it is not a regular file, is damaged, or was written by another version.
+            SceneError: if the file is not a regular file, is damaged, or was written by another version.
         """
         own = f"{cls.study}.json" if hasattr(cls, "study") else ""
         if own and (folder := path_of("path", path)).is_dir() and folder.name != own:

@@ -18,8 +18,8 @@ class CVaR:
     """Conditional value at risk: mean cost of the worst members (Rockafellar & Uryasev 2000).
 
     Args:
-        share: Fraction of the members, in (0, 1]; 0.05 for the worst 5 %. If it is not a whole number of members, the
-            last member counts in part.
+        share: Fraction of the members that count as the worst, in (0, 1]; 0.05 by default, for the worst 5 %. If the
+            share is no whole number of members, the least costly of these members counts in part.
 
     Raises:
         SceneError: If the share is not in (0, 1].

@@ -41,8 +41,8 @@ class Candidate:
         method: name of the method.
         h: step [s].
         dtype: precision, such as "float64" or "float32".
-        solver: solver of equation (24): "quartic", "cayley", "newton" or "moser_veselov".
-        iterations: number of the solver's Newton steps; None for as many as its tolerance needs.
+        solver: solver of equation (24), docs/theory/rotation.md: "quartic", "cayley", "newton" or "moser_veselov".
+        iterations: number of the solver's Newton steps; None: the solver iterates until its tolerance is met.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -63,14 +63,14 @@ class Candidate:
 
     @property
     def name(self) -> str:
-        """Text with method and solver, without step and dtype."""
+        """Text with the method and the solver, without the step and the precision."""
         if self.plain:
             return self.method
         return f"{self.method} {self.solver}" + ("" if self.iterations is None else f" {self.iterations}")
 
     @property
     def text(self) -> str:
-        """Text with method, solver and dtype, without step."""
+        """Text with the method, the solver and the precision, without the step."""
         return f"{self.name} {self.dtype}"
 
     def options(self) -> dict[str, Any]:
@@ -86,10 +86,10 @@ class Candidate:
         """Build the method with its solver.
 
         Returns:
-            The method, as `lw.solve` takes it.
+            The method, for the argument `method` of `lw.solve`.
 
         Raises:
-            SceneError: for a method or a solver that does not exist.
+            SceneError: if the method or the solver does not exist.
         """
         return Method(self.method, self.solver, self.iterations)
 

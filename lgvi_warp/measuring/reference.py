@@ -178,12 +178,12 @@ class Growth:
     Attributes:
         rate: slope of the logarithm of the difference over time, by least squares [1/s].
         doubling: time in which the difference doubles, ln 2 / rate [s]; infinite if growth is not exponential.
-        power: exponent p of the fit t^p, if it fits better than an exponential; else None.
-        factor: factor of growth over the whole run.
-        predictable: dtype -> time at which round-off has grown to 1e-2, extrapolated if needed [s]; may be infinite.
-        times: times of the curve (k,) [s].
-        curve: growth factor (k,) of the difference: root mean square over members, of position [m] and attitude [rad]
-            together.
+        power: exponent p if t^p fits the growth better than an exponential; otherwise None.
+        factor: final difference divided by the initial difference.
+        predictable: dtype -> time at which round-off has grown to 1e-2, extrapolated beyond the run, or infinite [s].
+        times: the k times of the curve (k,) [s].
+        curve: difference at each time (k,) divided by the initial difference: root mean square over members, with
+            differences in position [m] and attitude [rad] combined.
     """
 
     rate: float

@@ -30,23 +30,23 @@ MOST_DRIFT = 0.1
 class Final(Summarized):
     """Final states of n members of a run, and the memory of forces, actuators and controllers.
 
-    A run that continues from it with the same scene, members and settings is bit-identical to a single run:
-    `lw.solve(..., start=final)`, `lw.prepare(...).states(final)`. With other settings or other numbers of the members,
-    or after `changed`, it continues from the states and the memory.
+    A run can continue from it: `lw.solve(..., start=final)`, `lw.prepare(...).states(final)`. With the same scene,
+    members and settings, both parts are bit-identical to a single run. With other settings or other numbers of the
+    members, or after `changed`, the run continues from the states and the memory.
 
     Attributes:
         time: Time [s] since t = 0 of the first run.
         step: Step of the run [s].
         steps: Number of steps from t = 0.
-        states: Arrays of the saved fields, by name: position (n, 3) [m, inertial axes], attitude (n, 3, 3) body to
-            inertial axes, velocity (n, 3) [m/s, body axes], angular_velocity (n, 3) [rad/s, body axes].
-        status: Status of each member, shape (n,); members that failed or were stopped keep their states.
-        indices: Indices of the members in their ensemble (n,), which determine their noise.
+        states: Arrays of the saved fields of the motion, by name: position (n, 3) [m, inertial axes], attitude (n, 3,
+            3) (body to inertial axes), velocity (n, 3) [m/s, body axes], angular_velocity (n, 3) [rad/s, body axes].
+        status: Status of each member, shape (n,). A member that failed or was stopped does not move again.
+        indices: Index of each member in its ensemble (n,), which determines its noise.
         seed: Seed of the ensemble.
         parameters: Parameters of the members by name, each with a first dimension of 1 or n.
-        lanes: Rows (n, rows) by name in the form of the kernel: its state, memory and outcomes.
-        settings: Settings on which `lanes` depends: method, step, number type and laws; empty if members continue from
-            `states`.
+        lanes: Arrays (n, rows) by name, in the form of the kernel: state, memory and outcome of each member.
+        settings: Settings for which `lanes` holds: method, step, number type and laws. Empty if members continue from
+            `states` instead, as after `changed`.
 
     Methods:
         part: Select members.
@@ -75,7 +75,7 @@ class Final(Summarized):
     settings: Mapping[str, Any] = field(default_factory=dict)
 
     def summary_rows(self) -> tuple[str, Rows]:
-        """Rows of the summary: source and content."""
+        """Title and rows of the summary."""
         remembered = [name.removeprefix(MEMORY) for name, rows in self.lanes.items() if name.startswith(MEMORY)]
         rows = [
             ("step", f"{self.step:g} s, {self.steps:,} steps"),
@@ -118,7 +118,7 @@ class Final(Summarized):
         """Select members, in the given order; a member may occur several times.
 
         Args:
-            places: Positions of the members (m,), counted from 0; a slice; or a mask (n,).
+            places: Positions of m members among the n members (m,), counted from 0; a slice; or a mask (n,).
 
         Returns:
             The final states of these members.
@@ -134,11 +134,11 @@ class Final(Summarized):
         )
 
     def changed(self, **states: Any) -> Final:
-        """Give members other states; their memory is kept.
+        """Replace states of the members; their memory is kept.
 
         Args:
-            states: Any of position (n, 3) [m], attitude (n, 3, 3), velocity (n, 3) [m/s] and angular_velocity (n, 3) [rad/s],
-                as in `states`.
+            states: New arrays by name, as in the attribute `states`: any of position (n, 3) [m], attitude (n, 3, 3),
+                velocity (n, 3) [m/s] and angular_velocity (n, 3) [rad/s].
 
         Returns:
             The final states with these changes.
@@ -159,7 +159,7 @@ class Final(Summarized):
         return replace(self, states={**self.states, **arrays}, lanes=lanes, settings={})
 
     def to_arrays(self) -> dict[str, np.ndarray]:
-        """Convert to the arrays that `from_arrays` reads, without numbers and parameters.
+        """Convert to the arrays that `from_arrays` reads; its `numbers` and `parameters` are not included.
 
         Returns:
             Arrays (n, ...) by name.
@@ -178,16 +178,16 @@ class Final(Summarized):
         """Read final states from arrays.
 
         Args:
-            arrays: Arrays by name, as in `to_arrays`; others are ignored.
-            numbers: time, step, steps, seed and settings.
+            arrays: Arrays by name, as returned by `to_arrays`; arrays with other names are ignored.
+            numbers: Attributes by name: time, step, steps, seed and settings.
             parameters: Parameters of the members by name.
 
         Returns:
             The final states.
 
         Raises:
-            SceneError: If an entry is missing, or a status, an index, a shape or an attitude cannot be the end of a
-                run.
+            SceneError: If an entry is missing, or if a status, an index, a shape or an attitude is not possible at the
+                end of a run.
         """
         mapping_of("arrays", arrays, "arrays by name, as of Final.to_arrays")
         mapping_of("numbers", numbers, f"{', '.join(NUMBERS)}")
@@ -216,13 +216,13 @@ class Final(Summarized):
         return end
 
     def checked(self) -> Final:
-        """Return itself after checking values that come from a file.
+        """Check values that come from a file.
 
         Returns:
             This object.
 
         Raises:
-            SceneError: If a number, a status, an index, a shape or an attitude cannot be the end of a run.
+            SceneError: If a number, a status, an index, a shape or an attitude is not possible at the end of a run.
         """
         faults, remedy = Faults("final."), "give an end that lgvi-warp wrote"
         time, step = faults.number("time", self.time, "s", 0.0), faults.positive("step", self.step)

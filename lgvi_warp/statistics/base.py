@@ -97,16 +97,17 @@ class RowGatherer(Gatherer):
 class Statistic(Documented):
     """A statistic over members at every sample time. Abstract.
 
-    A member that fails is left out from its failure on.
+    A member that fails is left out after its failure.
 
     Args:
         of: A quantity, such as "depth" or "position[2]", a function of (samples, members), or a list of these
             (see lw.statistics.Quantity).
         name: Key of the estimate in the result; by default the type and the quantity, as in "mean position".
         confidence: Confidence level of the intervals, between 0 and 1; by default 0.95.
-        stopped: "held" keeps a member that an event stopped in its last state; "left_out" excludes it from then on.
-        at: An outcome, such as "floor": evaluate only the members with this outcome, in their final state. None, the
-            default: all members, at each sample time.
+        stopped: After an event stopped a member, "held" counts the member with its last state; "left_out" leaves it
+            out.
+        at: An outcome, such as "floor": the statistic is over the members with this outcome, in their final state.
+            None, the default: the statistic is over all members, at each sample time.
 
     Raises:
         SceneError: if arguments are faulty; the message lists all faults.

@@ -47,17 +47,17 @@ class Histogram(Counted):
     A bin contains its lower edge; the last bin also contains its upper edge. Give either `edges`, or `bins` and
     `limits`.
 
-    Arrays of the estimate, in addition to lower, upper and count (k,):
+    Arrays of the estimate, in addition to lower, upper and count (k,), for k sample times and d components:
 
-    * value (k, d, bins): fraction of the members.
-    * counts (k, d, bins): number of members.
-    * below, above (k, d): number of members outside the edges.
+    * value (k, d, bins): fraction of the members in each bin.
+    * counts (k, d, bins): number of members in each bin.
+    * below, above (k, d): number of members below the first and above the last edge.
 
     Args:
         edges: rising edges of the bins, in the quantity's unit.
-        bins: number of equal bins.
-        limits: (low, high) of equal bins, in the quantity's unit; or, for statistics of times (see EndTime), "run":
-            from the first to the last sample time.
+        bins: number of bins of equal width.
+        limits: (low, high), first and last edge of bins of equal width, in the quantity's unit; or "run", only for
+            statistics of times (see EndTime): from the first to the last sample time.
     """
 
     type: ClassVar[str] = "histogram"
@@ -202,11 +202,11 @@ class Condition(Statistic):
 
 @dataclass(frozen=True, eq=False)
 class Exceedance(Condition, Counted):
-    """Probability that a condition holds at each sample time: value (k, d), with Wilson's interval.
+    """Probability that a condition holds at each of k sample times, for d components: value (k, d), Wilson's interval.
 
     Args:
         above: lower limit, one number or one for each component, in the quantity's unit.
-        below: upper limit, in the same form; with both limits, the quantity must lie between them.
+        below: upper limit, in the same form. With both limits, the quantity must lie between them.
 
     Examples:
         >>> import lgvi_warp as lw

@@ -85,7 +85,7 @@ def component_dims(*names: str) -> Dims:
 class Mean(Statistic):
     """Mean and standard deviation over members, with Student's t interval of the mean.
 
-    Arrays of the estimate, in addition to lower, upper and count (k,):
+    Arrays of the estimate, in addition to lower, upper and count (k,), for k sample times and d components:
 
     * value (k, d): the mean.
     * standard_deviation (k, d): standard deviation of the members.
@@ -148,12 +148,12 @@ class Mean(Statistic):
 class Covariance(Statistic):
     """Covariance matrix over members, within one quantity or across several.
 
-    Interval: Student's t (n - 2) with the standard error from the members' own fourth moments (delta method), which
-    does not assume normal members. For a variance it is the interval of the logarithm, which is closer to normal.
-    Fourth moments of few members are biased towards small values; the bias for normal members, a term of order 1 / n,
-    is corrected (Bonett 2006 for variances). With two members the interval is infinite.
+    Interval: Student's t (n - 2, for n members) with the standard error from the members' own fourth moments (delta
+    method), which does not assume normal members. For a variance, the interval is computed for its logarithm, which is
+    closer to normal. Fourth moments of few members are biased towards small values; the bias for normal members, a term
+    of order 1 / n, is corrected (Bonett 2006 for variances). With two members the interval is infinite.
 
-    Arrays of the estimate, in addition to lower, upper and count (k,):
+    Arrays of the estimate, in addition to lower, upper and count (k,), for k sample times and d components:
 
     * value (k, d, d): the covariance, with divisor n - 1.
     * standard_error (k, d, d): standard error of the covariance.

@@ -31,12 +31,12 @@ EndsOf = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 class Extremes(Statistic):
     """Smallest and largest value over members, and the members that have them.
 
-    An extreme has no confidence interval; instead, `beyond` bounds the fraction of members outside.
+    An extreme has no confidence interval; instead, `beyond` bounds the fraction of the distribution outside.
 
-    Arrays of the estimate, in addition to count (k,):
+    Arrays of the estimate, in addition to count (k,), for k sample times and d components:
 
-    * minimum, maximum (k, d): the extremes; value is the maximum.
-    * minimum_member, maximum_member (k, d): indices of the members that have them; -1 if no member counts.
+    * minimum, maximum (k, d): the smallest and largest value; `value` equals maximum.
+    * minimum_member, maximum_member (k, d): indices of the members with these values; -1 if no member counts.
     * beyond (k,): with the statistic's confidence, at most this fraction of the distribution lies above the maximum,
       and at most this fraction below the minimum.
     """
@@ -97,9 +97,9 @@ class Quantiles(Statistic):
     """Quantiles over members: exact for up to `size` members, for more members from a sketch with a proven error bound.
 
     Interval: from the ranks of the sorted values (binomial, for any distribution), widened by the sketch's standard
-    error; infinite if too few members lie beyond the level. Each replicate has its own sketch.
+    error. The interval is infinite if too few members lie beyond the level. Each replicate has its own sketch.
 
-    Arrays of the estimate, in addition to lower, upper and count (k,):
+    Arrays of the estimate, in addition to lower, upper and count (k,), for k sample times and d components:
 
     * value (k, levels, d): the quantiles.
     * rank_error (k,): proven bound on the error of the rank, as a fraction of the members. Typical errors are several
@@ -107,8 +107,8 @@ class Quantiles(Statistic):
 
     Args:
         levels: fractions between 0 and 1; by default (0.05, 0.25, 0.5, 0.75, 0.95).
-        size: number of values that each level of the sketch keeps, a power of two from 64; by default 2048. Below 256
-            no block is exact, even with few members.
+        size: number of values that each level of the sketch keeps, a power of two from 64; by default 2048. With a size
+            below 256, quantiles are approximate even for few members.
 
     Examples:
         >>> import lgvi_warp as lw

@@ -93,29 +93,30 @@ def _endings(values: Values) -> Part:
 class Outcome(OfEnds):
     """Probability that a member has ended with an outcome, by each time.
 
-    The probability is Aalen & Johansen's estimate (1978) of the cumulative incidence: a member that another event stopped
-    can no longer have this outcome. A member that fails is censored at its failure, unless the outcome is a failure. If no
-    member fails, the estimate is the fraction of all members. The probabilities of all events and of "ok", which occurs at
-    the end of the run, sum to 1. Interval: Wilson's, with the number of members whose fraction has the variance of a
-    Dirichlet product; if none fails, this is the number of all members. Times are event times, not sample times.
+    The probability is Aalen & Johansen's estimate (1978) of the cumulative incidence: a member that another event
+    stopped can no longer have this outcome. A member that fails is censored at its failure, unless the outcome is a
+    failure. If no member fails, the estimate is the fraction of all members. The probabilities of all events and of
+    "ok" (the end of the run) sum to 1. Interval: Wilson's, with the number of members whose fraction has the variance
+    of a Dirichlet product; if no member fails, this is the number of all members. Times of events are exact, not
+    rounded to sample times.
 
-    Arrays of the estimate, in addition to lower and upper:
+    Arrays of the estimate, in addition to lower and upper, at k sample times:
 
     * value (k,): the probability; survival is 1 - value.
     * alone (k,): Kaplan & Meier's estimate (1958), in which other events also censor: the probability if no other event
-        stopped members. It assumes that the stopped members would have continued like the others. No run can show this,
-        and it rarely holds (a vehicle that surfaces does not sink). Its interval: alone_lower, alone_upper.
+      stopped members. It assumes that the stopped members would have continued like the others. No run can confirm this
+      assumption, and it rarely holds (a vehicle that surfaces does not sink). Interval: alone_lower, alone_upper.
     * fraction (k,): members that have ended with the outcome, as a fraction of all members, including failed members;
       fraction_lower, fraction_upper: Wilson's interval.
-    * ended, otherwise, failed (k,): by each time, number of members that have ended with the outcome, that have ended
-      otherwise, and that have ended otherwise by a failure.
+    * ended, otherwise, failed (k,): number of members that have ended by each time: with the outcome; in another way;
+      and in another way by a failure.
     * count (k,): number of members at risk at each time.
-    * end_time (levels,) [s]: time by which this fraction of the members has ended with the outcome, infinite if never;
+    * end_time (levels,) [s]: time by which this fraction of the members has ended with the outcome; infinite if never.
       end_time_lower, end_time_upper follow from the interval of value.
 
     Args:
-        of: "floor", "surface", the name of any event of the scene, "stopped" (by any event), a failure, or "failed" (by
-            any).
+        of: "floor", "surface" or the name of any event of the scene; "stopped", for all events; a failure; or "failed",
+            for all failures.
         name: Key of the estimate in the result; by default the type and the outcome, such as "outcome floor".
         levels: fractions of members between 0 and 1; by default (0.05, 0.5, 0.95).
 
@@ -283,15 +284,15 @@ def _reached(curve: np.ndarray, levels: np.ndarray, at: np.ndarray) -> np.ndarra
 class EndTime(OfEnds, MemberStatistic):
     """Statistics of the time [s] at which members ended with an outcome, over the members with this outcome.
 
-    Members with another outcome, or that reach the end of the run, are left out; Outcome takes them into account.
+    All other members are left out; Outcome takes them into account.
 
     Args:
-        of: "floor", "surface", the name of any event of the scene, "stopped" (by any event), a failure, or "failed" (by
-            any).
-        name: Key of the estimate in the result; by default the type and the outcome, such as "outcome floor".
-        then: statistic of these times over the members, or a list of statistics, each without its `of`; by default the mean,
-            quantiles and a histogram of 20 bins over the run: "mean end_time floor", "quantiles end_time floor", "histogram
-            end_time floor".
+        of: "floor", "surface" or the name of any event of the scene; "stopped", for all events; a failure; or "failed",
+            for all failures.
+        name: Key of the estimate in the result; by default the type and the outcome, such as "end_time floor".
+        then: statistic of these times over the members, or a list of statistics, each without its `of`; by default the
+            mean, quantiles and a histogram of 20 bins over the run: "mean end_time floor", "quantiles end_time floor",
+            "histogram end_time floor".
     """
 
     type: ClassVar[str] = "end_time"

@@ -113,27 +113,28 @@ def _of(weights: np.ndarray | None, which: np.ndarray) -> np.ndarray | None:
 class FirstPassage(Condition, Counted):
     """Time until a condition first holds, determined from the samples.
 
-    The probability is Aalen & Johansen's estimate. A member that an event stopped in a state in which the condition
-    does not hold never passes; with stopped="left_out" it is censored: its chance of passing later is assumed to equal
-    that of the others. A member that fails before it passes counts until its last valid sample. The estimate is NaN if
-    no member is known at any time. If none fails, the probability is the fraction of all members. Interval: Wilson's,
+    The probability is Aalen & Johansen's estimate. A member that an event stops before the condition holds never
+    passes. With stopped="left_out" this member is censored: its chance of passing later is assumed to equal the other
+    members' chance. A member that fails before it passes counts until its last valid sample. The estimate is NaN if no
+    member is known at any time. If no member fails, the probability is the fraction of all members. Interval: Wilson's,
     with the number of members whose fraction has the variance of a beta product (Fay, Brittain & Proschan 2013), which
-    accounts for few members at risk. If no member is at risk, its upper end allows for all unknown members.
+    accounts for few members at risk. If no member is at risk, the upper end of the interval allows for all unknown
+    members.
 
-    If the condition holds at a sample but not at the one before, the member passes where the line between the two
-    crosses the limit. A quantity without a limit, which is true or false, passes at the sample. A condition that holds
-    only between two samples is missed (an event of the scene checks every step).
+    If the condition holds at a sample but not at the sample before, the member passes where the straight line between
+    the two values crosses the limit. A quantity that is true or false has no limit; it passes at the sample. A
+    condition that holds only between two samples is missed (an event of the scene checks every step).
 
-    Arrays of the estimate, in addition to lower and upper:
+    Arrays of the estimate, in addition to lower and upper, at k sample times:
 
     * value (k,): probability of passing by each time; survival is 1 - value.
-    * passed (k,): number of members that pass at each time.
-    * lost (k,): number of members that failed before each time without passing.
-    * stopped (k,): number of members that an event stopped at each time, or since the time before, without passing.
-    * count (k,): number of members at risk of passing at each time.
-    * censored: number of members that were under way to the end and did not pass.
-    * passage_time (levels,) [s]: time by which this fraction has passed, infinite if never; passage_time_lower,
-      passage_time_upper follow from the interval of value.
+    * passed (k,): number of members that pass in the interval up to each time, after the time before.
+    * lost (k,): number of members that fail in this interval without having passed.
+    * stopped (k,): number of members that an event stops in this interval without having passed.
+    * count (k,): number of members at risk of passing in this interval.
+    * censored: number of members that ran to the end and did not pass.
+    * passage_time (levels,) [s]: time by which this fraction of the members has passed; infinite if never.
+      passage_time_lower, passage_time_upper follow from the interval of value.
 
     Args:
         of: A quantity of one component, such as "depth" or "position[2]" (see lw.statistics.Quantity).

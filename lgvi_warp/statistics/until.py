@@ -31,19 +31,19 @@ def _time_or_all(faults: Faults, key: str, value: Any) -> Any:
 
 @dataclass(frozen=True)
 class Until:
-    """Stopping rule: run blocks of members until a statistic's interval is narrow enough, at most all members.
+    """Stopping rule: run blocks of members until a statistic's interval is narrow enough, or all members have run.
 
     The run stops at the end of a block. Intervals are checked in the order of the blocks, so neither the number of
-    members nor any bit depends on threads. With replicates of a design, they are checked when the number of members is
-    a power of two. docs/guide/statistics_accuracy.md gives the effect of stopping on coverage.
+    members nor any bit of the result depends on threads. If the design has replicates, intervals are checked when the
+    number of members is a power of two. docs/guide/statistics_accuracy.md gives the effect of stopping on coverage.
 
     Args:
         statistic: name of one of the run's statistics, as the command prints it: "mean position"; of one component,
             "mean position[2]"; of one level, "quantiles depth 0.95" or "quantiles position[2] 0.95"; or of one entry of
-            a covariance, "covariance position[0], position[2]". A mean that is not among the run's statistics is added.
+            a covariance, "covariance position[0], position[2]". If the run does not compute a named mean, it is added.
         half_width: largest allowed half width of the interval, in the statistic's unit, above 0. All components and
             levels of the name must satisfy it.
-        at: sample time of the interval [s], by default the end; "all": every sample time.
+        at: sample time at which the interval is checked [s]; by default the end; "all": every sample time.
         members: minimum number of members, from 2; by default 1024, since the interval of a small sample may be too
             narrow.
 
@@ -72,7 +72,7 @@ class Until:
         object.__setattr__(self, "members", int(self.members))
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the table of a scene file that gives this rule."""
+        """Return the rule as a table of a scene file."""
         defaults = {"at": None, "members": 1024}
         return {name: value for name, value in vars(self).items() if name not in defaults or value != defaults[name]}
 

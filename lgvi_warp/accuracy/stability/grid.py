@@ -38,17 +38,17 @@ FORM = '"NAME", "NAME=LOW:HIGH" or "NAME=LOW:HIGH:linear", with ":scale" or ":se
 
 @dataclass(frozen=True)
 class Axis:
-    """Quantity along an axis of a map, from a low to a high value.
+    """Axis of a stability map: a quantity and the range of its values.
 
     Attributes:
-        name: "h": step [s]; "angular_velocity" [rad/s] or "speed" [m/s]: magnitude at the start (the direction is kept);
-            "added_mass_ratio": largest added mass divided by the mass [1]; "drag_number": largest damping rate (l + 2 q
-            |v|) / I at the start [1/s] (h times this rate is the drag number); or a name of scene.parameters().
+        name: "h": step [s]; "angular_velocity" [rad/s] or "speed" [m/s]: magnitude at the start (the direction is
+            kept); "added_mass_ratio": largest added mass divided by the mass [1]; "drag_number": largest damping rate
+            by drag at the start [1/s] (the step times this rate is the drag number); or a name of scene.parameters().
         low: lowest value; None derives it from the scene.
         high: highest value; None derives it from the scene.
-        log: True for values with equal ratios, False for equal differences. Default True.
-        scaled: True multiplies the parameter by the value, False sets it to the value. Default None: numbers are set;
-            vectors and matrices are multiplied.
+        log: True spaces the values by equal ratios, False by equal differences. Default True.
+        scaled: True multiplies the parameter by each value of the axis, False sets the parameter to this value. Default
+            None: a number is set; a vector or matrix is multiplied.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -70,7 +70,7 @@ class Axis:
             text: "NAME", "NAME=LOW:HIGH" or "NAME=LOW:HIGH:linear", with ":scale" or ":set" at the end for parameters.
 
         Returns:
-            The axis; parts that the text leaves out have their defaults.
+            The axis, with the default of each field that the text does not give.
 
         Raises:
             SceneError: if the text has another form.
@@ -122,7 +122,7 @@ class Line:
         label: text for a figure.
         unit: unit of the values.
         log: True if a figure draws the axis on a logarithmic scale.
-        values: the values (k,) [unit].
+        values: the k values along the axis (k,) [unit].
     """
 
     name: str
@@ -144,7 +144,7 @@ class Line:
         """Build an axis from the content of a JSON file.
 
         Args:
-            content: as `to_dict` returns it.
+            content: a dict as returned by `to_dict`.
 
         Returns:
             The axis.

@@ -51,14 +51,14 @@ GRIDS = {"omega": ("h", "angular_velocity"), "mass": ("h", "added_mass_ratio"), 
 
 
 class Cell(IntEnum):
-    """Class of a cell of a stability map: the worst of its members.
+    """Class of a cell of a stability map: the worst class of the cell's members.
 
     Attributes:
         ACCURATE: the error is below its bound.
-        BOUNDED: the error exceeds its bound; energy and rotation are bounded.
-        FLAGGED: bounded, with a status or a warning.
-        FAILED: unbounded or not finite, with a status or a warning.
-        SILENT: unbounded, without a status or a warning.
+        BOUNDED: the error exceeds its bound, but energy and rotation stay bounded.
+        FLAGGED: energy and rotation stay bounded, but the member has the status of a failure, or a warning.
+        FAILED: energy or rotation is unbounded or not finite, and the status of a failure or a warning reports it.
+        SILENT: energy or rotation is unbounded, and neither a status nor a warning reports it.
     """
 
     ACCURATE = 0
@@ -86,29 +86,29 @@ TEXTS = {
 
 @dataclass(frozen=True, eq=False)
 class StabilityMap(Saved):
-    """Classes of cells over two axes, for each method.
+    """Stability map: a grid over two axes, with the class of each cell for each method.
 
     Attributes:
         x: horizontal axis, with nx values.
         y: vertical axis, with ny values.
         classes: method -> Cell codes (ny, nx).
-        errors: method -> largest error up to error_time (ny, nx) [unit]; infinite if it could not be measured.
-        energies: method -> largest growth of energy divided by energy_bound (ny, nx) [1]; unbounded above 1.
+        errors: method -> largest error up to error_time (ny, nx) [unit]; infinite if the error could not be measured.
+        energies: method -> largest growth of energy divided by energy_bound (ny, nx) [1]; a value above 1 is unbounded.
         statuses: method -> worst Status code (ny, nx); 255 if the program refused to run the cell.
-        ratios: method -> limit -> step h divided by the analytic step limit of the fastest start (ny, nx) [1]; above 1
-            the step exceeds the limit. The names of the limits are in accuracy.stability.limits.LIMITS.
+        ratios: method -> name of a limit -> step divided by this analytic limit, for each cell's fastest start (ny, nx)
+            [1]; above 1 the step exceeds the limit. Limits: "rotation", "munk", "restoring" and "drag".
         of: name of the quantity whose error is measured.
         error_bound: largest error of an accurate cell [unit].
         error_time: time up to which errors count, rounded up to whole steps [s].
         t1: time up to which energy counts, rounded up to whole steps [s].
         directions: number of starts of each cell.
-        judged: criterion for the energies: "conservative", "dissipative" or "driven".
+        judged: kind of the scene, which decides how energies are judged: "conservative", "dissipative" or "driven".
         reference: description of the reference of the errors.
         unverified: number of cells whose reference is not accurate enough; they cannot be classified as accurate.
         provenance: scene, settings, versions and machine.
         refused: method -> reason why it cannot run the scene.
         messages: notes for the user.
-        seconds: time in which the map was computed [s].
+        seconds: duration of the computation of the map [s].
         unit: unit of the errors. Default: the unit of `of`.
     """
 
@@ -169,15 +169,15 @@ class StabilityMap(Saved):
         return tuple(self.classes)
 
     def limit(self, method: str, worst: Cell = Cell.BOUNDED) -> np.ndarray:
-        """Find the limit of x in each row: the largest x up to which no cell has a class worse than `worst`.
+        """Find the limit of x in each row: the largest x up to which all cells of the row have class `worst` or better.
 
         Args:
             method: name of a method of the map.
             worst: worst class that is accepted. Default: Cell.BOUNDED.
 
         Returns:
-            Limit for each y (ny,) [x.unit]; NaN if already the first cell is worse. If the limit is the last x, the
-            true limit may lie beyond the map.
+            Limit for each y (ny,) [x.unit]; NaN if the first cell of the row is already worse. If the limit is the last
+            x, the true limit may lie beyond the map.
 
         Raises:
             SceneError: for a method that the map does not have.
@@ -200,7 +200,7 @@ class StabilityMap(Saved):
         return {cell.name.lower(): int(np.sum(self._of(method) == cell)) for cell in Cell}
 
     def silent(self, method: str) -> list[tuple[float, float]]:
-        """List the silent cells: their energy is unbounded, but no status or warning reports it. There should be none.
+        """List the silent cells: energy or rotation is unbounded without a status or warning. None should exist.
 
         Args:
             method: name of a method of the map.
@@ -295,34 +295,34 @@ def stability_map(
 
     Classes of a cell:
 
-    * accurate: the error stays below the bound up to error_time, against two fine runs that agree ten times better;
+    * accurate: the error, measured from one of two fine runs that agree ten times better, is small up to error_time;
     * bounded: not accurate, but energy and rotation stay bounded up to t1;
-    * flagged: bounded, and a member got a status or a warning;
-    * failed: unbounded, and a member got a status or a warning; or some numbers are not finite;
-    * silent: unbounded, and no member got a status or a warning.
+    * flagged: energy and rotation stay bounded, but a member has the status of a failure, or a warning;
+    * failed: energy or rotation is unbounded or not finite, and the status of a failure or a warning reports it;
+    * silent: energy or rotation is unbounded, and neither a status nor a warning reports it.
 
-    Energy is bounded if its change (conservative scene) or its growth (damped scene) is less than energy_bound times the sum
-    of the kinetic energy that the start's momenta allow and the energy that the potentials have supplied. Wrenches,
-    thrusters and waves change the energy: for such scenes it is compared with the energy of the reference, up to
-    error_time or 16 steps. The scene's [ensemble] is ignored.
+    Energy is bounded if its change (conservative scene) or growth (damped scene) is at most energy_bound times a scale.
+    The scale is the largest kinetic energy possible with the start's momenta, plus the largest change of potential
+    energy. If a force may supply energy, the energy is compared with the reference's, up to error_time.
 
     Args:
-        scene: the scene.
+        scene: the scene; its [ensemble] is ignored.
         x: horizontal axis: "h", "angular_velocity", "speed", "added_mass_ratio", "drag_number" or a name of
             scene.parameters(); as a text ("h=0.01:3", "vehicle.mass=50:500:linear"), as (name, low, high), or as a
             lw.studies.Axis. Default "h".
         y: vertical axis, given in the same forms as x. Default "angular_velocity".
         methods: names of the methods. Default: psi, psi_s, psi_x and rk4.
         points: number of cells along both axes, or two numbers for x and y. Default 24.
-        t1: time up to which energy counts [s]. Default: ten periods of the fastest motion at the start.
-        error: error bound of an accurate cell, in the unit of `of`; above 0. Default 1e-2.
+        t1: time up to which energy is checked [s]. Default: ten periods of the fastest motion at the start.
+        error: largest error of an accurate cell, in the unit of `of`; above 0. Default 1e-2.
         of: quantity whose error is measured: a name that statistics accept ("attitude", "position", "depth",
             "euler[1]", ...), or a lw.statistics.Quantity. Default "attitude" [rad].
-        error_time: time up to which errors count [s]. Default: one period of the fastest motion at the start.
-        energy_bound: largest growth of energy of a bounded cell [1]. Default 1.
-        directions: number of starts of each cell: the scene's own, and others with velocity and spin turned at random;
-            the worst start decides the class. Default 4.
-        h: step [s], if no axis varies it. Default: run.step of the scene.
+        error_time: time up to which errors are measured [s]; at least 16 steps if a force may supply energy. Default:
+            one period of the fastest motion at the start.
+        energy_bound: largest growth of energy of a bounded cell, as a fraction of the scale above [1]. Default 1.
+        directions: number of starts of each cell: the scene's own start, and others with velocity and angular velocity
+            turned at random. The worst start decides the class. Default 4.
+        h: step [s], if neither axis is "h". Default: run.step of the scene.
         dtype: precision. Default: the scene's precision.
         seed: seed of the random turns. Default 0.
         threads: number of threads. Default: all threads of this machine.
@@ -332,7 +332,7 @@ def stability_map(
         The map.
 
     Raises:
-        SceneError: if arguments are faulty (one message lists all), if no method can run the scene, or if noise acts.
+        SceneError: if arguments are faulty (one message lists all faults), no method can run the scene, or noise acts.
 
     Examples:
         >>> import lgvi_warp as lw

@@ -31,10 +31,10 @@ INPUTS = ("commands", "wrench")
 @explained
 @dataclass(frozen=True)
 class LinearModel:
-    """Discrete linear model of deviations from a motion: x' = A x + B u after one period, y = C x + D u.
+    """Discrete linear model of deviations from a motion: x' = A x + B u, y = C x + D u.
 
-    The first twelve states are position [m] in inertial axes, rotation vector [rad] in body axes, and velocity [m/s] and
-    angular velocity [rad/s] in body axes. They are also the outputs. The memory of actuators and of control parts follows.
+    x: n states; x': one period later; u: m inputs; y: the first 12 states: position [m, inertial axes], rotation vector
+    [rad], velocity [m/s], angular velocity [rad/s] (body axes). Memory of actuators and control parts follows.
 
     Attributes:
         A: state matrix (n, n).
@@ -43,7 +43,7 @@ class LinearModel:
         D: feedthrough matrix (12, m).
         dt: the period [s].
         states: names of the states (n,), such as "velocity[0]", "control_fins.place[1]", "heading_pid.memory[0]".
-        inputs: names of the inputs (m,), such as "control_fins[0]", or "X" to "N" of a wrench.
+        inputs: names of the inputs (m,), such as "control_fins[0]"; for a wrench "X", "Y", "Z", "K", "M" and "N".
         about: the motion at the start of the period: position, attitude, velocity and angular_velocity by name.
         messages: notes on parts of the scene that the model leaves out: noise, drift and rounding of sensors, faults.
     """
@@ -70,11 +70,11 @@ class LinearModel:
         return np.asarray(values[np.argsort(-np.abs(values))])
 
     def part(self, states: Sequence[str], inputs: Sequence[str] | None = None) -> LinearModel:
-        """Reduce the model to some states; the others are held at 0.
+        """Reduce the model to some of its states and inputs; all other states and inputs are set to 0.
 
         Args:
             states: names of the states to keep; a whole name, such as "velocity", keeps all of its entries.
-            inputs: names of the inputs to keep; None, the default, keeps all.
+            inputs: names of the inputs to keep; None, the default, keeps all inputs.
 
         Returns:
             The smaller model.
@@ -91,10 +91,10 @@ class LinearModel:
             states=tuple(self.states[i] for i in keep), inputs=tuple(self.inputs[i] for i in push))  # fmt: skip
 
     def state_space(self) -> Any:
-        """Convert the model for python-control (the extra `control`), with its margins, plots and designs.
+        """Convert the model to a StateSpace of python-control (extra: control), for its margins, plots and designs.
 
         Returns:
-            A control.StateSpace with the names of this model; dots become underscores.
+            A control.StateSpace with the names of this model's states, inputs and outputs; dots become underscores.
 
         Raises:
             MissingExtra: If python-control is not installed.
@@ -132,30 +132,30 @@ def linearize(
     h: float | None = None,
     step: float = STEP,
 ) -> LinearModel:
-    """Linearise one period of the plant with commands that are held, or of the closed loop.
+    """Linearise one period of the plant with constant commands, or of the closed loop.
 
-    The model follows from central differences of the run's own steps, all in one launch. So it includes the method, the
-    lags of actuators and the hold as in a run. Its errors are step^2 times a third derivative, and round-off / step:
-    some 1e-10. In a closed loop, noise, drift and rounding of sensors are set to their mean, 0, and faults are off.
+    Central differences of the run's own steps give the model, so it includes the method, the lags of actuators and the
+    hold of commands. Its errors are step^2 times a third derivative, and round-off / step: about 1e-10. In a closed
+    loop, noise, drift and rounding of sensors are set to 0, their mean, and faults are off.
 
     Args:
         scene: The scene, without waves and noise; or an Ensemble, whose scene is used.
-        about: The motion: the answer of `lw.linear.trim`; or, for a closed loop, a time [s], for the motion of the run at
-            that time. None, the default: the start of the scene with commands of 0; a closed loop after its first period.
-        inputs: "commands" of the actuators, the default; or "wrench", for a plant only: X, Y, Z [N], K, M, N [N m] in
-            body axes about the body's origin, held for a period, while the actuators keep their commands.
+        about: Motion to linearise about: a result of `lw.linear.trim`; or, in a closed loop, a time [s] of a run. None,
+            the default: the start with commands of 0; in a closed loop the motion after one period.
+        inputs: "commands" of the actuators, the default; or, for a plant only, "wrench": X, Y, Z [N], K, M, N [N m] in
+            body axes about the body's origin, held for a period. The actuators then keep their commands.
         closed: True includes the controller in the model; the inputs are then added to its commands. Default False.
-        period: Period of a plant [s]; default the controller's period, else the step.
-        method: As in `lw.solve`; default the method of the trim, else of the scene.
-        h: Step [s]; default the step of the trim, else of the scene.
-        step: Increment of the central differences, relative for numbers above 1; default 1e-5.
+        period: Period of a plant [s]. Default: the controller's period; without a controller, the step.
+        method: As in `lw.solve`. Default: the method of the trim; without a trim, the scene's method.
+        h: Step [s]. Default: the step of the trim; without a trim, the scene's step.
+        step: Increment of the central differences; for numbers above 1 it is relative. Default 1e-5.
 
     Returns:
         The model.
 
     Raises:
-        SceneError: If an argument is at fault, if a part of the controller is random or acts only at some ticks, or if
-            a member slightly off the motion fails.
+        SceneError: If an argument is wrong, if a part of the controller is random or acts only at some ticks, or if a
+            vehicle that starts slightly off the motion fails.
 
     Examples:
         >>> import lgvi_warp as lw

@@ -20,12 +20,12 @@ from lgvi_warp.robustness.linear.linearize import LinearModel
 @explained
 @dataclass(frozen=True)
 class Regulator:
-    """The linear quadratic regulator u = -K x of a model.
+    """Linear quadratic regulator u = -K x, with n states x and m inputs u of a linear model.
 
     Attributes:
         K: the gains (m, n), from each state to each input.
-        P: (n, n); x^T P x is the minimal cost from x, the sum over ticks of x^T Q x + u^T R u.
-        poles: eigenvalues of A - B K (n,), the largest first.
+        P: (n, n), matrix of the minimal cost: from x, the sum of x^T Q x + u^T R u over all ticks is x^T P x.
+        poles: eigenvalues of A - B K (n,), the largest first; A and B are the matrices of the model.
         model: the linear model.
     """
 
@@ -38,10 +38,10 @@ class Regulator:
         """Convert the gains to a law of a controller.
 
         Args:
-            name: Name of the law in the controller; by default its type.
+            name: Name of the law in the controller; by default its type, "state_feedback".
 
         Returns:
-            The law, with attitude gains corrected for its velocity error nu - R^T v_d, unlike the model's deviation of nu.
+            The law. Its attitude gains allow for the law's velocity error, which differs from the model's deviation.
 
         Raises:
             SceneError: If an input is not a component of a wrench, or a state is not a coordinate of the motion.
@@ -64,18 +64,18 @@ class Regulator:
 
 
 def lqr(model: LinearModel, Q: Any, R: Any) -> Regulator:
-    """Design a linear quadratic regulator: gains that minimise the sum over ticks of x^T Q x + u^T R u.
+    """Design a linear quadratic regulator: gains that minimise the sum of x^T Q x + u^T R u over all ticks.
 
     Args:
-        model: The linear model, as from `lw.linear.linearize`; for `lw.control.StateFeedback` with inputs="wrench".
-        Q: Weights of the states: a matrix (n, n) or its diagonal (n,), >= 0.
-        R: Weights of the inputs: a matrix (m, m) or its diagonal (m,), > 0.
+        model: Linear model from `lw.linear.linearize`; n states x, m inputs u. `Regulator.law` needs inputs="wrench".
+        Q: Weights of the states: a positive semidefinite matrix (n, n), or its diagonal (n,).
+        R: Weights of the inputs: a positive definite matrix (m, m), or its diagonal (m,).
 
     Returns:
         The gains, the matrix of the cost, and the poles of the closed loop.
 
     Raises:
-        SceneError: If a matrix is at fault, or no gains stabilise every state; the message names the poles at fault.
+        SceneError: If a matrix is wrong, or no gains stabilise all states; the message names the uncontrollable poles.
 
     Examples:
         >>> import lgvi_warp as lw

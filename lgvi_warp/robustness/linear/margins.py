@@ -80,24 +80,24 @@ def _percentages(of: Any) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Margins(Saved):
-    """Margins of a loop by member.
+    """Margins of each member's loop.
 
-    The margins of a member are NaN if its unchanged loop does not settle; `why` has the reason.
+    The margins of a member are NaN if its unchanged loop does not settle; `why` gives the reason.
 
     Attributes:
         loop: key of the law; "all laws" for the whole controller.
-        values: margins by name, each (n,). "gain_lower" and "gain_upper": bounds of the factors on the demand that the
-            loop tolerates; 0 and infinite if it tolerates all that were tried. "delay": the largest tolerated delay [s]
-            in addition to the loop's own, in whole steps. "phase": the phase margin [rad], with the crossover frequency
-            at which it is smallest ("phase_frequency" [rad/s]); infinite, at a frequency of NaN, if no gain of the loop
-            crosses 1. "disk": the disk margin of all components of the demand at once, with the factors
-            ("disk_gain_lower", "disk_gain_upper") and phases ("disk_phase" [rad]) that it guarantees, and its frequency
-            ("disk_frequency" [rad/s]). "sensitivity_peak", "complementary_peak" and, for the numbers in `to`, such as
-            "position[2]_peak": peak gains, with their frequencies ("..._frequency" [rad/s]).
+        values: margins by name, each (n,), by eigenvalues. "gain_lower", "gain_upper": smallest and largest factor on
+            the demand that the loop tolerates; 0 or infinite if it tolerates all factors tried. "delay": largest
+            tolerated extra delay [s], in whole steps; infinite if it tolerates the longest tried. "phase": phase margin
+            [rad], with its crossover frequency ("phase_frequency" [rad/s]); infinite and NaN if no gain of the loop
+            crosses 1. "disk": disk margin of all components of the demand at once; the factors ("disk_gain_lower",
+            "disk_gain_upper") and phases ("disk_phase" [rad]) that it guarantees; its frequency ("disk_frequency"
+            [rad/s]). "sensitivity_peak", "complementary_peak" and, for numbers in `to`, such as "position[2]_peak":
+            peak gains, with "..._frequency" [rad/s].
         by_runs: the same margins computed by runs, if requested.
-        why: (n,), reason why a member has no margins: "does not settle", "at its limit: thrusters[3]" if the command
-            stays there, "moves nothing" if the commands have no effect, or "failed"; "" if it has margins.
-        step: step of the runs [s]; delays are multiples of it.
+        why: (n,), reason why a member has no margins: "does not settle"; "at its limit: thrusters[3]" if a command
+            stays at its limit; "moves nothing" if the demand has no effect; or "failed". "" if the member has margins.
+        step: step of the runs [s]; delays are multiples of this step.
         messages: notes for the user, such as that the step was shortened to fit the period.
         members: number of members, n.
         steady: True for members whose unchanged loop settles, (n,).
@@ -105,7 +105,7 @@ class Margins(Saved):
 
     Methods:
         percentiles: Percentiles of each margin over the members that settle.
-        curve: Distribution of a margin.
+        curve: Cumulative distribution of a margin over the members.
         worst: Members with the smallest margins.
     """
 
@@ -168,7 +168,7 @@ class Margins(Saved):
             of: percentages (k,), in [0, 100].
 
         Returns:
-            Percentiles of each margin, name -> (k,). Each is the margin of a member; NaN if no member has margins.
+            Percentiles of each margin, name -> (k,). A percentile is the margin of one member; NaN if none has margins.
         """
         quantiles = _percentages(of) / 100.0
         known = {name: v[~np.isnan(v)] for name, v in self._columns().items()}
@@ -182,10 +182,10 @@ class Margins(Saved):
 
         Args:
             name: "gain_lower", "gain_upper", "delay", "disk" or another of `values`.
-            by: "eigenvalues" or "runs"; None, the default, takes the first of them that was computed.
+            by: "eigenvalues" or "runs"; None, the default: "eigenvalues" if these margins were computed, else "runs".
 
         Returns:
-            (rising margins of members whose unchanged loop settles; fraction of these with at most this margin).
+            (margins of the members whose unchanged loop settles, sorted; fraction of these members up to each margin).
         """
         ways = dict(zip(WAYS, (self.values, self.by_runs), strict=True))
         columns = self._columns() if by is None else _named("by", by, ways)
@@ -196,12 +196,12 @@ class Margins(Saved):
         """Find the members with the smallest margins.
 
         Args:
-            count: number of members (default 10).
+            count: number of members; 10 by default.
             name: name of the margin; None, the default, takes the first of "gain_upper", "delay", "phase", "disk" and
-                "sensitivity_peak" that was computed. For peaks, the largest is the worst.
+                "sensitivity_peak" that was computed. For "gain_lower" and for peaks, the largest value is the worst.
 
         Returns:
-            Indices (count,), the worst first; members whose unchanged loop does not settle come before all others.
+            Indices (count,), the worst first. Members whose unchanged loop does not settle come before all others.
         """
         columns = self._columns()
         chosen = name or next(word for word in ("gain_upper", *NAMED, "sensitivity_peak") if word in columns)
@@ -210,7 +210,7 @@ class Margins(Saved):
 
     @property
     def reasons_text(self) -> str:
-        """Text of the reasons, the most frequent first."""
+        """Text of the reasons why members have no margins, the most frequent reason first."""
         return "; ".join(f"{count:,}: {why}" for why, count in self.reasons.items())
 
     def _columns(self) -> Mapping[str, np.ndarray]:
@@ -272,64 +272,64 @@ def margins(
 ) -> Margins:
     """Compute the gain, delay and phase margins of each member's loop.
 
-    A member's loop is examined about its motion after `about` seconds. This motion must be steady: one period later,
-    velocities, rates, the vertical, the commands and quantities held at a set-point are the same to 1e-6, and no
-    command is at its limit. Otherwise the member runs on for twice the time, and again, up to `settle`. The member is
-    then turned by `tilt`, and must return to the motion in a run. If one of these conditions fails, the member has no
-    margins, and `why` names the condition.
+    A member's loop is examined about its motion after `about` seconds. This motion must be steady: over one period,
+    velocities, rates, the vertical, commands and quantities held at a set-point change by less than 1e-6, and no
+    command is at its limit. Until then the time is doubled, up to `settle`. A run that starts from the motion, turned
+    by `tilt`, must return to it. If one of these conditions fails, the member has no margins; see `why`.
 
     By eigenvalues: margins follow from the eigenvalues of the linearised sampled loop about that motion. The loop is
     affine in the factor on the law's demand, and each delay within a period is linearised, so bisection needs no runs.
-    Neutral modes that no law observes do not count.
+    Neutral modes that no law observes are ignored.
 
-    By runs: every member runs with its own factor or delay, and each run bisects the brackets of all members. The runs
-    start from the same motion, turned by `tilt`. A loop settles if two conditions hold. The swing of its rates and commands
-    shrinks from the second to the last third of the run, and is smaller than in the first third. In the last third no
-    command is at its limit, and the body is off the motion by less than 10 tilts and turns by less within a period. If the
-    swing shrinks only slightly, a run of 1.5 times the length is examined, too. The tracking error is not examined: a slow
-    integral hides a small fast limit cycle in it. If stability changes repeatedly, the margin is at one of the changes.
+    By runs: every member runs with its own factor or delay, and each run halves the brackets of all members' margins.
+    The runs start from the same motion, turned by `tilt`. A loop settles if two conditions hold. The swing of its rates
+    and commands shrinks from the second to the last third of the run, and is smaller than in the first third. In the
+    last third no command is at its limit, and the body stays within 10 tilts of the motion and turns by less within a
+    period. If the swing shrinks only slightly, a longer run (1.5 times) decides. The tracking error is not examined: a
+    slow integral hides small fast limit cycles in it. If stability changes repeatedly, the margin is one of the
+    changes.
 
-    Noise and drift of sensors are set to 0, their mean, and faults are off; by eigenvalues, so is rounding: see `messages`.
+    Noise and drift of sensors, by eigenvalues also rounding, are set to 0, their mean. Faults are off; see `messages`.
 
-    The phase margin is the smallest phase, lag or lead, at which the loop becomes unstable if it is applied to all
-    components of the law's demand at once. For one component it follows from the crossovers of the gain; for several,
-    from the crossovers of the characteristic loci of the sampled loop (MacFarlane, Postlethwaite 1977, Int. J. Control
-    25(1)). It is infinite if no gain crosses 1 between 1e-5 of the Nyquist frequency and the Nyquist frequency.
+    The phase margin is the smallest phase shift, lag or lead, of all components of the law's demand that makes the loop
+    unstable. For one component it follows from the crossovers of the gain; for several, from the crossovers of the
+    characteristic loci of the sampled loop (MacFarlane, Postlethwaite 1977, Int. J. Control 25(1)). The margin is
+    infinite if no gain crosses 1 between 1e-5 of the Nyquist frequency and the Nyquist frequency.
 
     The disk margin is computed for the sampled loop, opened at all components of the law's demand. The loop remains
     stable if each component has its own complex factor, at any frequency, in the disk (1 + (1 - skew) d / 2) / (1 - (1
     + skew) d / 2), |d| < margin (Seiler, Packard, Gahinet 2020, IEEE Control Systems 40(5)). The margin is 1 / (largest
-    structured singular value of S + (skew - 1) / 2).
+    structured singular value of S + (skew - 1) / 2), with the sensitivity S.
 
-    A peak gain is the largest gain over frequency from a disturbance that is added to the law's demand. Its outputs are the
-    demand that acts (S, the sensitivity), the law's response (T), and each number of the motion in `to`, per unit of the
-    demand. With several components the gain is the largest singular value, so the peak is the H-infinity norm. It is
-    infinite if the gain grows towards frequency 0. The largest peak of all members is the worst-case gain of the ensemble.
+    A peak gain is the largest gain over frequency from a disturbance of the law's demand to an output: the total demand
+    (S, the sensitivity), the law's response (T), or a number of the motion in `to`, per unit of the demand. With
+    several components the gain is the largest singular value, and the peak is the H-infinity norm. The peak is infinite
+    if the gain grows towards frequency 0. The largest peak of all members is the ensemble's worst-case gain.
 
     Args:
         fleet: An Ensemble, or a Scene whose [ensemble] is used; without waves and noise.
         loop: Key of the law, such as "heading_pid"; None, the default, for all laws together.
-        of: Some of "gain", "delay", "phase", "disk" and "peak"; the first two by default. "delay" delays all commands;
-            "phase", "disk" and "peak" are computed by eigenvalues only.
-        by: "eigenvalues", the default, "runs", or both.
+        of: Some of "gain", "delay", "phase", "disk" and "peak"; "gain" and "delay" by default. "delay" delays all
+            commands; "phase", "disk" and "peak" are computed by eigenvalues only.
+        by: Ways to compute the margins: "eigenvalues", the default, "runs", or both.
         about: Time at which the loop is examined [s]; 60 by default.
-        settle: Longest time until a member must be steady [s]; 1200 by default.
+        settle: Time by which a member must be steady [s]; 1200 by default.
         seconds: Length of the runs [s]; 240 by default.
         tilt: Angle by which the start of a run is turned about each axis of the body [rad]; 0.001 by default.
-        most: Largest factor that is tried; the smallest factor is 1 / most. 100 by default.
+        most: Largest factor that is tried; the smallest factor tried is 1 / most. 100 by default.
         longest: Longest delay that is added [s]; 10 by default.
-        skew: Skew of the disk, from -1 to 1. 0, the default: the disk contains the inverse of each of its factors; 1:
-            the margin follows from the sensitivity S alone.
-        to: Numbers of the motion that get a peak gain too, such as "position[2]" [m], "rotation[1]" [rad, body axes],
-            "velocity" [m/s] or "angular_velocity" [rad/s], as in `linearize`; none by default.
-        method: As in `lw.solve`; default the scene's method.
-        h: Step [s]; default the scene's step.
+        skew: Skew of the disk, from -1 to 1. With 0, the default, the disk contains the inverse of each of its factors.
+            With 1, the margin follows from the sensitivity S alone.
+        to: Numbers of the motion for which peak gains are also computed, such as "position[2]" [m], "rotation[1]" [rad,
+            body axes], "velocity" [m/s] or "angular_velocity" [rad/s], as in `linearize`; none by default.
+        method: As in `lw.solve`; the scene's method by default.
+        h: Step [s]; the scene's step by default.
 
     Returns:
         The margins of each member.
 
     Raises:
-        SceneError: If an argument or the scene is at fault.
+        SceneError: If an argument is wrong, or the scene does not allow margins.
 
     Examples:
         >>> import lgvi_warp as lw

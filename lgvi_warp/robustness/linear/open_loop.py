@@ -34,16 +34,16 @@ Matrices = tuple[np.ndarray, np.ndarray, np.ndarray]
 @explained
 @dataclass(frozen=True, repr=False)
 class OpenLoops:
-    """Open loops of members: x' = A x + B u after one tick, y = C x; the feedback u = -y closes them.
+    """Open loop of each member as a linear model: x' = A x + B u, y = C x. The feedback u = -y closes the loop.
 
-    The states x are linear combinations of the loop's states; states that no law observes are left out.
+    x: k states, linear combinations of the loop's observed states; x': x one tick later; u: r inputs; y: r outputs.
 
     Attributes:
-        at: input at which the loops are opened.
+        at: place at which the loops are opened, as in `loop`.
         models: (A, B, C) of each member, (k, k), (k, r) and (r, k); None for a member without a loop.
         names: names of the inputs u and outputs y (r,): components of a demand, or commands.
         dt: the period [s].
-        why: (n,), reason why a member has no loop, as in `lw.linear.margins`; "" if it has one.
+        why: (n,), reason why a member has no loop, as in `lw.linear.margins`; "" if the member has a loop.
         messages: notes for the user, such as effects that linear loops leave out.
         members: number of members, n.
     """
@@ -68,22 +68,22 @@ class OpenLoops:
         return "\n".join([*self.messages, f"The loop is opened at {self.at}{inputs} in {some}."])
 
     def frequencies(self) -> np.ndarray:
-        """Choose frequencies at which all loops are evaluated: a grid, and the frequencies of their poles.
+        """Choose frequencies for plots of all loops: a grid, and the frequencies of the loops' poles.
 
         Returns:
-            Frequencies (k,), rising to the Nyquist frequency [rad/s].
+            Frequencies (k,) in increasing order, up to the Nyquist frequency [rad/s].
         """
         each = [grid_of(_response(model)) for model in self.models if model is not None]
         return np.unique(np.concatenate([np.zeros(0), *each])) / self.dt
 
     def response(self, frequencies: Any) -> np.ndarray:
-        """Compute the frequency responses L(e^(i w dt)).
+        """Compute the frequency response L(e^(i w dt)) of each open loop, with L(z) = C (z - A)^-1 B.
 
         Args:
             frequencies: frequencies w (k,) [rad/s].
 
         Returns:
-            Complex responses (n, k, r, r); NaN for members without a loop, and at a pole.
+            Complex responses (n, k, r, r); NaN for members without a loop, and at frequencies of poles.
         """
         angles, r = np.asarray(frequencies, float) * self.dt, len(self.names)
         found = np.full((self.members, len(angles), r, r), np.nan, complex)
@@ -94,7 +94,7 @@ class OpenLoops:
         return np.where(np.isfinite(found), found, np.nan)
 
     def loci(self, frequencies: Any) -> np.ndarray:
-        """Compute the characteristic loci, the eigenvalues of L; with one input, they are L itself.
+        """Compute the characteristic loci: the eigenvalues of the frequency response L; for one input, L itself.
 
         Args:
             frequencies: frequencies w (k,) [rad/s].
@@ -108,13 +108,13 @@ class OpenLoops:
         return np.where(lost[..., None], np.nan, values)
 
     def state_space(self, member: int = 0) -> Any:
-        """Convert the loop of a member for python-control (the extra `control`).
+        """Convert the open loop of a member to a StateSpace of python-control (extra: control).
 
         Args:
             member: index of the member; 0 by default.
 
         Returns:
-            A control.StateSpace with the period as its dt.
+            A control.StateSpace whose dt is the period.
 
         Raises:
             MissingExtra: If python-control is not installed.
@@ -126,14 +126,14 @@ class OpenLoops:
         )
 
     def frd(self, member: int = 0, frequencies: Any = None) -> Any:
-        """Convert the frequency response of a member for python-control (the extra `control`).
+        """Convert the open loop's frequency response of a member to an FRD of python-control (extra: control).
 
         Args:
             member: index of the member; 0 by default.
-            frequencies: frequencies w (k,) [rad/s]; None, the default, takes `frequencies()`.
+            frequencies: k frequencies (k,) [rad/s]; None, the default: a grid, and the frequencies of the loop's poles.
 
         Returns:
-            A control.FRD with the period as its dt.
+            A control.FRD whose dt is the period.
 
         Raises:
             MissingExtra: If python-control is not installed.
@@ -180,26 +180,26 @@ def loop(
     method: str | Method | None = None,
     h: float | None = None,
 ) -> OpenLoops:
-    """Open the loop of each member at an input, and return it as a linear model of one period.
+    """Open the control loop of each member at a demand or command, and return the open loop as a linear model.
 
-    The loop is the same as in `margins`: it is linearised about the member's motion after `about` seconds, which must
-    be steady. The closed loop need not be stable. All other loops stay closed.
+    As in `lw.linear.margins`, the loop is linearised about the member's motion after `about` seconds, which must be
+    steady. The closed loop need not be stable. Loops through other demands or commands stay closed.
 
     Args:
         fleet: An Ensemble, or a Scene whose [ensemble] is used; without waves and noise of the water.
-        at: Input at which the loop is opened: key of a law, such as "heading_pid", for all components of its demand; "X" to
-            "N" for a component of the demand of all laws; a command, such as "control_fins[0]"; or an actuator, such as
-            "control_fins", for all of its commands. None, the default, opens it at the whole demand of all laws.
+        at: Place at which to open the loop: key of a law, such as "heading_pid" (all components of its demand); "X",
+            "Y", "Z", "K", "M" or "N" (one component of all laws' demand); a command, such as "control_fins[0]"; or an
+            actuator, such as "control_fins" (all its commands). None, the default: the whole demand of all laws.
         about: Time at which the loop is examined [s]; 60 by default.
-        settle: Longest time until a member must be steady [s]; 1200 by default.
-        method: As in `lw.solve`; default the scene's method.
-        h: Step [s]; default the scene's step.
+        settle: Time by which a member must be steady [s]; 1200 by default.
+        method: As in `lw.solve`; the scene's method by default.
+        h: Step [s]; the scene's step by default.
 
     Returns:
         The open loops.
 
     Raises:
-        SceneError: If an argument or the scene is at fault.
+        SceneError: If an argument is wrong, or the scene does not allow a linear loop.
 
     Examples:
         >>> import lgvi_warp as lw

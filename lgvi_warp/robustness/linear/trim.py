@@ -39,14 +39,14 @@ class Trim(Saved):
     """A steady straight and level motion.
 
     Attributes:
-        start: the state, which can be the start of a scene.
-        commands: key of an actuator -> commands that hold the motion, (channels,).
+        start: state of the motion, for the field `start` of a scene.
+        commands: key of an actuator -> commands that maintain the motion, (channels,).
         values: values of the free quantities by name: roll, pitch and drift (course minus heading) [rad], speed [m/s],
             and commands, such as "thrusters[0]".
         fixed: values of the fixed quantities by name.
         residual: remaining accelerations (6,) in body axes [m/s2, rad/s2].
-        method: the method whose steps preserve the motion.
-        h: step of the method [s].
+        method: method with which a run keeps the motion.
+        h: step with which a run keeps the motion [s].
     """
 
     study: ClassVar[str] = "trim"
@@ -119,23 +119,23 @@ def trim(
 ) -> Trim:
     """Find a steady straight and level motion at the position and heading of the scene's start.
 
-    Velocities and rates are the same after a step of the method, so a run from there stays there, to round-off. The motion
-    differs from the equations' steady motion by the method's error of one step. The scene's controller is left out.
+    Velocities and rates are the same after a step of the method, so a run that starts with this motion keeps it, to
+    round-off. The motion differs from the equations' steady motion by the method's error. The controller is left out.
 
     Args:
         scene: The scene, or an Ensemble, whose scene is used.
-        speed: Speed over ground [m/s]; None, the default, leaves it free, as for a propeller with constant thrust.
-        free: Names of the quantities that may be chosen: "roll", "pitch", "drift" (course minus heading), "speed", and
-            commands, such as "thrusters[0]", or "thrusters" for all of a term; None, the default, for all. Others are 0.
-        fixed: Values of quantities that are not free, by the same names; None, the default, for 0.
-        method: As in `lw.solve`; default the scene's method.
-        h: Step [s]; default the scene's step.
+        speed: Speed over ground [m/s]; None, the default: the speed is free, as for a propeller with constant thrust.
+        free: Names of free quantities: "roll", "pitch", "drift" (course minus heading), "speed", commands, such as
+            "thrusters[0]", or "thrusters" for all commands of the term. None, the default: all that are not fixed.
+        fixed: Values of other quantities by name; None by default. A quantity neither free nor fixed is 0.
+        method: As in `lw.solve`; the scene's method by default.
+        h: Step [s]; the scene's step by default.
 
     Returns:
         The motion, with the values of the free quantities and the remaining acceleration.
 
     Raises:
-        SceneError: If there is no such motion, or waves or noise act.
+        SceneError: If no steady motion is found, or waves or noise act.
 
     Examples:
         >>> import lgvi_warp as lw

@@ -34,28 +34,28 @@ from lgvi_warp.statistics.base import Statistic
 
 @dataclass(frozen=True)
 class Tuned(Saved):
-    """Tuned numbers: the numbers with the lowest risk that a search found.
+    """Tuned numbers, such as gains: the numbers with the lowest risk that a search found.
 
     Attributes:
-        parameters: the numbers by name.
-        before: the scene's own numbers.
+        parameters: tuned numbers by name.
+        before: the scene's own values of these numbers.
         cost: risk over the members of the search; optimistic, since the numbers were chosen with these members.
-        fresh_cost: risk over new members, which the search did not use; NaN if no new members can be drawn.
+        fresh_cost: risk over fresh members, which the search did not use; NaN if no fresh members can be drawn.
         fresh_before: risk of the scene's own numbers, over the same fresh members.
-        of: name of the quantity.
-        risk: description of the risk.
+        of: name of the quantity that is the cost.
+        risk: description of the risk, such as "mean".
         members: number of members that the search used.
         fresh: number of fresh members.
-        at_bounds: names of the numbers that lie at their bounds; the bounds may be too narrow.
-        restarts: (r,), the lowest risk of each evolution.
+        at_bounds: names of the tuned numbers that lie at their bounds; these bounds may be too narrow.
+        restarts: (r,), lowest risk found by each of the r evolutions.
         runs: number of members that were run.
-        units: unit of the quantity and of the numbers, by name.
+        units: unit of the quantity and of each tuned number, by name.
         constraints: text, such as "disk above 0.5" -> dict. "worst": value of the member of the search that is closest
-            to the bound or violates it most; "fresh_worst": the same among fresh members; "fresh_before": the same
-            among fresh members with the scene's own numbers; "fresh_broken": number of fresh members that violate the
-            bound. NaN if a member has no value.
-        messages: notes on effects that the margins of constraints leave out.
-        feasible: True if all members of the search keep all constraints.
+            to the bound or violates it most; "fresh_worst": the same for fresh members; "fresh_before": the same for
+            fresh members with the scene's own numbers; "fresh_broken": number of fresh members that violate the bound.
+            A value is NaN if some member has none.
+        messages: notes for the user on effects that margins in the constraints neglect.
+        feasible: True if all members of the search satisfy all constraints.
     """
 
     study: ClassVar[str] = "tune_gains"
@@ -79,7 +79,7 @@ class Tuned(Saved):
 
     @property
     def optimism(self) -> float:
-        """Risk of fresh members minus risk of the members of the search."""
+        """Risk over fresh members minus risk over the members of the search."""
         return self.fresh_cost - self.cost
 
     def _content(self) -> dict[str, Any]:
@@ -162,25 +162,25 @@ def tune_gains(
 ) -> Tuned:
     """Tune numbers, such as gains, to minimise the risk over a fleet.
 
-    Every candidate runs on the same members, with the same noise: a generation is an ensemble of candidates times
-    members. The best candidate is then run on fresh members.
+    A candidate is one set of values of these numbers. Every candidate runs on the same members, with the same noise, so
+    a generation of candidates is one ensemble. The best candidate is then run on fresh members.
 
     Args:
         fleet: An Ensemble, whose members are drawn from distributions; or a Scene, whose [ensemble] is used.
-        over: Numbers to tune, by name, with their bounds (low, high), or (low, high, "log") to search by the logarithm:
-            {"heading_pid.kp": (0.1, 10.0, "log")}.
+        over: Numbers to tune, by name, with their bounds: (low, high), or (low, high, "log") to search on a logarithmic
+            scale, such as {"heading_pid.kp": (0.1, 10.0, "log")}.
         minimise: The cost, one number of each member: a quantity, as in `lw.prepare`; or a metric, as in `lw.sweep`,
             such as "iae depth" or lw.metrics.SettlingTime("depth", within=0.5).
-        risk: "mean", the default; the level of a quantile, such as 0.95; or `lw.metrics.CVaR(0.05)`, the mean cost of
-            the worst 5 % of the members. A member that fails has an infinite cost.
+        risk: How the members' costs are reduced to one number: "mean", the default; a quantile's level, such as 0.95;
+            or `lw.metrics.CVaR(0.05)`, the mean cost of the worst 5 %. A member that fails has an infinite cost.
         budget: Number of members that the search may run, over all candidates; 100,000 by default.
-        fresh: Number of fresh members; None, the default, for four times the fleet's number of members.
-        restarts: Number of evolutions; 1 by default.
+        fresh: Number of fresh members; None, the default: four times the number of members of the fleet.
+        restarts: Number of independent evolutions; 1 by default.
         seed: Seed of the search; 0 by default.
-        constraints: Bounds that every member must keep: on a margin of all laws, "disk above 0.5", or of one law,
-            "phase heading_pid above 0.6", with the names of `lw.linear.margins`; on a metric, "overshoot depth below
-            0.3"; on a quantity, "max(depth) below 12.0". Candidates that keep all bounds are preferred to all others. A
-            loop that does not settle violates every bound on its margins. None by default.
+        constraints: Bounds that every member must satisfy: on a margin of all laws together, "disk above 0.5", or of
+            one law, "phase heading_pid above 0.6", with the names of `lw.linear.margins`; on a metric, "overshoot depth
+            below 0.3"; on a quantity, "max(depth) below 12.0". Candidates that satisfy all bounds are preferred. A loop
+            that does not settle violates every bound on its margins. By default no constraints.
         progress: True shows a bar or lines, as in lw.solve; a function is called with the used fraction of the budget.
             None, the default: nothing is shown.
         **settings: As in `lw.prepare`: method, h, t1, save, dtype, threads, ...
@@ -189,7 +189,7 @@ def tune_gains(
         The numbers, with their risk over the members of the search and over fresh members.
 
     Raises:
-        SceneError: If an argument is at fault.
+        SceneError: If an argument is wrong.
 
     Examples:
         >>> import lgvi_warp as lw

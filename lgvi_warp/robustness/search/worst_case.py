@@ -31,21 +31,21 @@ WORST = ("largest", "smallest")
 
 @dataclass(frozen=True)
 class WorstCase(Saved):
-    """The worst member that a search found; the true worst case may be worse.
+    """Worst member that a search found. The true worst case may be worse.
 
     Attributes:
-        parameters: values of the searched numbers, by name.
-        value: the quantity of this member; infinite if the member failed. The search ends at the first failed member.
+        parameters: values of the searched numbers for this member, by name.
+        value: quantity of this member; infinite if the member failed. The search ends at the first failed member.
         of: name of the quantity.
-        worst: "largest" or "smallest".
-        at_bounds: name of a number -> the bound at which it lies: "low", "high", or "" for none.
-        restarts: (r,), the worst value of each evolution; if they differ, a longer search may find a worse value.
+        worst: "largest" or "smallest": which values of the quantity count as worst.
+        at_bounds: name of a number -> bound at which the number lies: "low", "high", or "" for neither.
+        restarts: (r,), worst value found by each of the r evolutions; if they differ, a longer search may find worse.
         runs: number of members that were run.
-        fleet: ensemble of this one member, to run it again; None if this answer was read from a file. The table worst_case.csv
-            in its folder also gives the member: lw.Ensemble(scene, sampling=lw.designs.Table("worst_case.csv")).
-        of_metric: True if the quantity is a metric, which is infinite for a loop that never settles; by default False.
-        points: number of members that were spread evenly over the box.
-        units: unit of the quantity and of the numbers, by name.
+        fleet: ensemble of this one member, to run it again; None if the answer was read from a file. The file
+            worst_case.csv holds the same member: lw.Ensemble(scene, sampling=lw.designs.Table("worst_case.csv")).
+        of_metric: True if the quantity is a metric, which may be infinite without a failed member; by default False.
+        points: number of members that were spread evenly over the box of bounds.
+        units: unit of the quantity and of each searched number, by name.
     """
 
     study: ClassVar[str] = "worst_case"
@@ -64,7 +64,7 @@ class WorstCase(Saved):
 
     @property
     def unseen(self) -> float:
-        """Fraction of the box that a peak must fill to be found with probability 95 %; 1 without spread points."""
+        """Fraction of the box that a peak must fill for one of `points` to hit it with probability 95 %; 1 for none."""
         return least_peak(self.points)
 
     def _content(self) -> dict[str, Any]:
@@ -121,20 +121,20 @@ def worst_case(
 ) -> WorstCase:
     """Search for the worst case of a quantity within bounds of the scene's numbers.
 
-    Differential evolution runs several times from different starts; each generation is an ensemble. Then come the corners
-    of the box, if they are few, and a local search from the worst point. The rest of the budget goes to Sobol points over
-    the whole box, and to local searches from the worst of them. All members get the same noise. A worse case may remain
-    unseen: `unseen` of the answer is the fraction of the box that a peak must fill to be found with probability 95 %.
+    Differential evolution runs several times from different starts; each generation is an ensemble. The corners of the
+    box of bounds follow, if they are few, then a local search from the worst point. The rest of the budget goes to
+    Sobol points over the whole box and local searches from the worst of them. All members get the same noise. A peak
+    may remain undetected; `unseen` of the answer bounds the fraction of the box that it fills, with probability 95 %.
 
     Args:
         fleet: A Scene, or an Ensemble, whose scene is used. Numbers that are not searched keep the scene's values.
-        within: Numbers to search, by name, with their bounds (low, high), such as {"vehicle.buoyancy": (297.0, 302.0)};
-            or (low, high, "log") to search by the logarithm.
+        within: Numbers to search, by name, with their bounds: (low, high), such as {"vehicle.buoyancy": (297.0,
+            302.0)}; or (low, high, "log") to search on a logarithmic scale.
         of: A quantity with one number, as in `lw.prepare`: "max(depth)", a Quantity, a function of a Result; or a
             metric, as in `lw.sweep`: "overshoot depth", lw.metrics.SettlingTime("depth", within=0.5).
-        worst: "largest", the default, or "smallest". A member that fails is worse than all others and ends the search.
+        worst: Worst value: "largest", the default, or "smallest". A failed member is worst of all and ends the search.
         budget: Number of members that may be run; 20,000 by default.
-        restarts: Number of evolutions; 3 by default, fewer if the budget is small.
+        restarts: Number of evolutions; 3 by default. A small budget allows fewer.
         seed: Seed of the search; 0 by default.
         progress: True shows a bar or lines, as in lw.solve; a function is called with the used fraction of the budget.
             None, the default: nothing is shown.
@@ -144,7 +144,7 @@ def worst_case(
         The worst member.
 
     Raises:
-        SceneError: If an argument is at fault.
+        SceneError: If an argument is wrong.
 
     Examples:
         >>> import lgvi_warp as lw

@@ -27,19 +27,19 @@ RARE = ("relative_error", "cheaper", "most")
 
 @dataclass(frozen=True)
 class Case:
-    """One design of a sweep.
+    """Case of a sweep: one design, described by its changes to the sweep's scene.
 
     Args:
         name: name of the case.
-        set: numbers by name that replace the scene's: {"heading_pid.kp": 2.0, "drag.quadratic[0]": 3.0}. A number that
-            varies in the fleet is constant in this case.
-        replace: lists that replace the scene's: {"laws": [...]} or another list of the controller, "events", the whole
-            "controller", or "terms". An entry of "terms" replaces the term of its name, or is added.
-        vehicle: another vehicle, lw.Vehicle(...), or some of its numbers by field; None (default) for the scene's vehicle.
-        scene: another scene, to which the rest is applied; None (default) for the sweep's scene.
-        rare: True estimates the probability that a member does not pass, even if it is very small, by lw.rare_event; or
-            a dict with some arguments of lw.rare_event, {"relative_error": 0.2, "cheaper": [{"h": 0.1}], "most":
-            200_000}. None (default) takes the sweep's `rare`.
+        set: numbers by name that replace the scene's numbers: {"heading_pid.kp": 2.0, "drag.quadratic[0]": 3.0}. If
+            such a number varies in the fleet, it is constant in this case.
+        replace: lists that replace the scene's lists: {"laws": [...]} or another list of the controller, "events", the
+            whole "controller", or "terms". An entry of "terms" replaces the term with the same name, or is added.
+        vehicle: another vehicle, lw.Vehicle(...), or some of its numbers by field; None (default): the scene's vehicle.
+        scene: another scene, to which the other changes are applied; None (default): the sweep's scene.
+        rare: True estimates by lw.rare_event the probability that a member does not pass, even a very small one; or a
+            dict with some arguments of lw.rare_event, {"relative_error": 0.2, "cheaper": [{"h": 0.1}], "most":
+            200_000}. None (default): as the argument `rare` of the sweep.
 
     Raises:
         SceneError: an argument has the wrong type.
@@ -78,7 +78,7 @@ class Case:
             scene: the sweep's scene.
 
         Returns:
-            The sweep's scene, or the case's own scene, with the vehicle, lists and numbers of the case.
+            The case's own scene if it has one, otherwise the sweep's, with the vehicle, lists and numbers of the case.
 
         Raises:
             SceneError: the case does not fit the scene.

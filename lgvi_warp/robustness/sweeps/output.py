@@ -42,13 +42,13 @@ class Sweep(SweepTable):
     Attributes:
         setup: description of the runs.
         cells: all combinations of a case and a point of the grid, in order.
-        records: results of the cells' members.
+        records: results of the members of each cell.
         conditions: conditions that a member must fulfil to pass.
-        baseline: name of the case that others are compared with.
+        baseline: name of the case with which the other cases are compared.
         confidence: confidence level of all intervals.
         interval: kind of the confidence intervals of probabilities.
-        rares: rare failures of the cells that request them; None if no cell does.
-        matters: smallest differences that matter, as given: by "success" [points] or name of a metric [its unit].
+        rares: rare failures of the cells for which they were requested; None if they were requested for no cell.
+        matters: smallest differences that matter: by "success" [percentage points] or name of a metric [its unit].
         cases: names of the cases.
         metrics: names of the metrics.
         table: the rows as an xarray Dataset.
@@ -59,7 +59,7 @@ class Sweep(SweepTable):
         ranking: Rank the cases by success.
         worst: The worst members of all cells.
         causes: Inputs that explain success or a metric.
-        values: A metric of all members.
+        values: A metric of all members of a cell.
         survival: Probability that a member neither failed nor was stopped by each time.
         members: Indices of members that fail to pass, or of members that pass.
         again: Run members of a case again and save their samples.
@@ -71,7 +71,7 @@ class Sweep(SweepTable):
 
     @property
     def answer(self) -> str:
-        """The best and the worst cells in one sentence; the text of `str` ends with it."""
+        """The best and the worst cells in one sentence. The text of `str` ends with this sentence."""
         return answer_of(self)
 
     def compare(
@@ -84,20 +84,20 @@ class Sweep(SweepTable):
     ) -> list[PairedComparison]:
         """Compare two cases on the same members: their success and each metric, at each point of the grid.
 
-        Success: difference of the paired proportions, with Tango's interval and McNemar's exact test. Metrics: paired t
-        test over members that failed in neither case and whose numbers are finite; for a quantile, a bootstrap over
-        members. Holm's method corrects p for the number of comparisons. See docs/guide/is_my_controller_robust.md.
+        Success: difference of paired proportions, with Tango's interval and McNemar's exact test. Metrics: paired t
+        test, or bootstrap for a quantile, over members with finite numbers that failed in neither case. Holm's method
+        corrects the p-values for the number of comparisons. See docs/guide/is_my_controller_robust.md.
 
         Args:
             first: name of a case.
             second: name of another case; differences are second minus first.
-            at: values of the grid by name; None (default) for all points.
+            at: values of the grid by name that select points; None (default) for all points.
             quantile: level of a quantile that is compared instead of the mean; None (default) for means.
-            matters: the smallest difference that matters, as in `lw.sweep`; None (default) takes the sweep's.
+            matters: the smallest difference that matters, as in `lw.sweep`; None (default): as given to the sweep.
 
         Returns:
-            The comparisons; at each point, success comes first. `row()` of a comparison is a record of a table. If
-            `matters` is given, its `verdict` is "better", "worse", "equivalent" or "undecided".
+            The comparisons; at each point, success comes first. `row()` of a comparison is a record of a table. With
+            `matters`, `verdict` of a comparison is "better", "worse", "equivalent" or "undecided".
 
         Raises:
             SceneError: there is no such case, point or metric.
@@ -107,7 +107,7 @@ class Sweep(SweepTable):
         return self.corrected_for_number([row for a, b in pairs for row in compared(judged, a, b, quantile)])
 
     def corrected_for_number(self, rows: list[PairedComparison]) -> list[PairedComparison]:
-        """Correct p of simultaneous comparisons for their number, by Holm's method.
+        """Correct the p-values p of simultaneous comparisons for their number, by Holm's method.
 
         Args:
             rows: the comparisons, as in `compare`.
@@ -119,9 +119,9 @@ class Sweep(SweepTable):
         return corrected([of_kind(f"rows[{i}]", row, *kind) for i, row in enumerate(rows)], self.confidence)
 
     def rare(self, case: str, at: Mapping[str, Any] | None = None) -> RareEvent:
-        """Return the rare failure of a case that requests it: the probability that a member does not pass.
+        """Return the rare failure of a case for which it was requested: the probability that a member does not pass.
 
-        Its failing members are those that comparisons run in other cases, some 4,000 at most.
+        The answer lists at most about 4,000 failing members. `compare_rare` runs these members in other cases.
 
         Args:
             case: name of the case.
@@ -131,7 +131,7 @@ class Sweep(SweepTable):
             The answer of `lw.rare_event`: probability, interval, failing members, and the likeliest of them.
 
         Raises:
-            SceneError: there is no such case or point, the case did not request it, or it was refused.
+            SceneError: there is no such case or point, the case did not request a rare failure, or it was refused.
         """
         cell = self.cell(case, at)
         answer = None if self.rares is None else self.rares.of(cell)
@@ -146,16 +146,16 @@ class Sweep(SweepTable):
     def compare_rare(self, first: str, second: str, at: Mapping[str, Any] | None = None) -> list[RareComparison]:
         """Compare the rare failures of two cases at each point of the grid: ratio of their failure probabilities.
 
-        Failing members of each case are run in the other case, with the same numbers and noise: P(B) / P(A) = P(B | A)
-        / P(A | B). If too few fail in both, the ratio of the two answers is used. Holm's method corrects p.
+        Failing members of each case, A and B, also run in the other, with the same numbers and noise: P(B) / P(A) = P(B
+        | A) / P(A | B). If too few fail in both, the two estimates are divided. Holm's method corrects the p-values.
 
         Args:
             first: name of a case.
             second: name of another case; ratios are second divided by first.
-            at: values of the grid by name; None (default) for all points.
+            at: values of the grid by name that select points; None (default) for all points.
 
         Returns:
-            The comparisons at points at which both cases have a rare failure; `row()` of each is a record of a table.
+            The comparisons at all points where both cases have a rare failure. `row()` of each is a record of a table.
 
         Raises:
             SceneError: there is no such case or point.
@@ -164,14 +164,14 @@ class Sweep(SweepTable):
         return [] if self.rares is None else self.rares.compare(pairs)
 
     def ranking(self, at: Mapping[str, Any] | None = None) -> list[dict[str, Any]]:
-        """Rank the cases by success, with the cases that each is significantly better than, and by how much.
+        """Rank the cases by success; list for each case the cases that it beats significantly, and by how much.
 
-        With a grid, a case's success is the mean over members of the share of points at which the member passes. A case
-        that was refused at a point is left out. All pairs of cases are tested: by McNemar's exact test or, with a grid,
-        by a paired t test of the shares. Holm's method corrects p for the number of pairs.
+        With a grid, a case's success is the mean over members of the fraction of points at which the member passes. A
+        case that was refused at a point is left out. All pairs of cases are tested: by McNemar's exact test or, with a
+        grid, by a paired t test of the fractions. Holm's method corrects the p-values for the number of pairs.
 
         Args:
-            at: values of the grid by name; None (default) for all points.
+            at: values of the grid by name that select points; None (default) for all points.
 
         Returns:
             Records with rank, case, value, lower, upper, better_than and better_by; the best case comes first.
@@ -182,12 +182,12 @@ class Sweep(SweepTable):
         return ranks(self, at)
 
     def worst(self, count: int = 20, by: str | None = None, case: str | None = None) -> list[dict[str, Any]]:
-        """Find the worst members of all cells: failed members, the earliest first, then the largest by a metric.
+        """Find the worst members of all cells: first the members that failed earliest, then the largest of a metric.
 
         Args:
             count: number of members; by default 20.
-            by: name of the metric; default the first metric that success limits from above, else the first metric.
-            case: name of the case; None (default) for all.
+            by: name of the metric. Default: the first metric with an upper limit in `success`, else the first metric.
+            case: name of the case; None (default) for all cases.
 
         Returns:
             Records with case, point, member, status, passed, the metrics and the inputs that vary.
@@ -220,11 +220,11 @@ class Sweep(SweepTable):
                 **{name: float(x[0]) for name, x in inputs.items()}}  # fmt: skip
 
     def causes(self, case: str, at: Mapping[str, Any] | None = None, of: str = SUCCESS) -> list[dict[str, Any]]:
-        """Find which of the inputs that vary explain success or a metric, the most important first.
+        """Find which of the varied inputs explain success or a metric, the most important first.
 
-        share: fraction of the variance over members that the conditional mean given this input explains. It is estimated by
-        bins of the members at hand, with its interval and the p of an F test, corrected for the number of inputs by Holm's
-        method. slope: standardised coefficient of a linear regression on all inputs. Inputs should be independent.
+        share: fraction of the variance over members that this input alone explains, estimated by bins of the members,
+        with an interval and the p-value p of an F test. Holm's method corrects p for the number of inputs. slope:
+        standardised coefficient of a linear regression on all inputs. Inputs should be independent.
 
         Args:
             case: name of the case.
@@ -232,7 +232,7 @@ class Sweep(SweepTable):
             of: "success" (default), or the name of a metric, over members that did not fail.
 
         Returns:
-            Records with input, share, lower, upper, p, slope, and the input's medians over passing and other members.
+            Records with input, share, lower, upper, p, slope, and the input's medians over passing and failing members.
 
         Raises:
             SceneError: there is no such case, point or metric, or it was refused.
@@ -263,8 +263,8 @@ class Sweep(SweepTable):
             case: name of the case.
             members: indices of the members.
             at: values of the grid by name; may be left out if there is no grid.
-            save: sample times and fields; default those of the scene.
-            threads: number of threads; default as in `lw.solve`.
+            save: sample times and fields; by default those of the scene.
+            threads: number of threads; by default as in `lw.solve`.
 
         Returns:
             The result of these members.

@@ -58,51 +58,52 @@ def sweep(
     """Compare controller designs on the same members: success rate, ranking, worst members.
 
     A cell is a case at a point of the grid. All cells have the same vehicles, starts, seas, sensor noise and faults:
-    random numbers depend only on seed, member and name. Numbers that a case sets, and numbers that it does not have, do
-    not vary in it. Cells that differ only in numbers share a kernel. If a case is refused or does not compile, this is
-    recorded, and the others continue.
+    random numbers depend only on seed, member and name. In a cell, a number of `vary` is constant if the case sets it,
+    and is ignored if the case does not have it. Cells that differ only in numbers share a kernel. If a case is refused
+    or does not compile, the result records this, and the other cases run.
 
-    With `out`, memory holds the numbers of one cell at a time, 8 bytes for each member and metric; else of all cells.
+    Each member and metric takes 8 bytes. With `out`, only one cell is in memory at a time; without it, all cells are.
 
     Args:
         scene: The scene, the path of a scene file, or an Ensemble, whose scene, members, seed, vary and sampling are used.
         cases: Cases, or tables with `name`, `set` (numbers by name), `replace` (lists of parts, such as "laws"),
-            `vehicle` (another vehicle, or some of its numbers) and `scene` (another scene); or {name of a case: numbers
-            that it sets}. Default: the scene alone.
+            `vehicle` (another vehicle, or some of its numbers) and `scene` (another scene); or {name of a case: its
+            numbers}. Default: one case, the scene without changes.
         grid: Name of a number -> its values; every case is run at all combinations. By default no grid.
-        vary: Distributions in addition to the scene's, as for Ensemble; they replace those of the same name.
-        members: Number of members of every cell; default the scene's.
-        seed: Seed of the members; default the scene's.
-        sampling: As for Ensemble; default the scene's.
+        vary: Distributions, as for Ensemble, in addition to the scene's; for the same name, they replace the scene's.
+        members: Number of members of every cell; by default the scene's.
+        seed: Seed of the members; by default the scene's.
+        sampling: As for Ensemble; by default the scene's.
         metrics: Metrics, each one number of each member: lw.metrics.Overshoot("depth"), a table {"type": "iae", "of":
             "heading"}, "iae heading", or an expression over the path, "max(norm(demand))". "time_to_failure" is added.
-        success: Conditions of success: {"status": "ok", "overshoot depth": {"below": 1.0}}. Default: it reaches the end.
-        baseline: Name of the case that others are compared with; default the first case.
+        success: Conditions of success: {"status": "ok", "overshoot depth": {"below": 1.0}}. By default a member
+            succeeds if it reaches the end of the run.
+        baseline: Name of the case with which the others are compared; by default the first case.
         confidence: Confidence level of all intervals, between 0 and 1; by default 0.95.
         interval: Kind of the intervals of probabilities: "wilson" (default) or "clopper_pearson".
-        matters: The smallest difference that matters: of success in percentage points, such as 1.0; or also of metrics
-            in their units, {"success": 1.0, "overshoot depth": 0.1}. The verdict of a comparison is then better or
-            worse (by more than this), equivalent (the interval lies within it) or undecided. A smaller metric is
-            better, unless success limits it from below only. By default None.
-        rare: True estimates the probability that a member does not pass, even if it is very small, by lw.rare_event, in
+        matters: The smallest difference that matters: of success in percentage points, such as 1.0; or of success and
+            metrics, {"success": 1.0, "overshoot depth": 0.1}, metrics in their units. A comparison then has a verdict:
+            better or worse (by more than this difference), equivalent (the interval lies within it) or undecided. A
+            smaller metric is better, unless `success` gives it only a lower limit. By default None.
+        rare: True estimates by lw.rare_event the probability that a member does not pass, even a very small one, in
             every cell whose case does not set `rare`; or a dict with some arguments of lw.rare_event,
-            {"relative_error": 0.2, "cheaper": [{"h": 0.1}], "most": 200_000}. Two cells are compared by the failing
-            members of both. None (default): only in cells whose case sets it.
-        out: Folder. Finished cells are stored there, so that the same call continues after a stop, with the same bytes.
-            Cells whose numbers, metrics, functions or settings have changed are run again. Your own functions are
-            identified by their code and the objects it refers to; or by the `version` of lw.control.Callback and
-            lw.metrics.CustomMetric, if given.
-        threads: As of solve.
-        executor: As of solve; default "threads".
-        scheduler: As of solve; default None.
-        progress: As of solve, over all cells; None, the default: nothing is shown.
-        **settings: Further arguments of solve, such as method, h, t1, dtype.
+            {"relative_error": 0.2, "cheaper": [{"h": 0.1}], "most": 200_000}. To compare two cells, the failing members
+            of each are also run in the other. None (default): only in cells whose case sets `rare`.
+        out: Folder for finished cells: after an interruption, the same call continues and gives the same bytes. Cells
+            whose numbers, metrics, functions or settings have changed run again. Your own functions are identified by
+            their code and the objects it uses, or by a `version` given to lw.control.Callback or
+            lw.metrics.CustomMetric.
+        threads: As in lw.solve.
+        executor: As in lw.solve; "threads" by default.
+        scheduler: As in lw.solve; None by default.
+        progress: As in lw.solve, over all cells; None, the default: nothing is shown.
+        **settings: Further arguments of lw.solve, such as method, h, t1, dtype.
 
     Returns:
         The sweep: success, comparisons, ranks, the worst members and their causes, as tables, files and texts.
 
     Raises:
-        SceneError: If arguments are at fault; the message names every fault.
+        SceneError: If arguments are wrong; the message names every fault.
         OSError: If the folder cannot be written.
 
     Examples:

@@ -92,7 +92,7 @@ class SweepTable:
             cell: one of `cells`.
 
         Returns:
-            The record: `status` (n,), `numbers`, metric -> (n,), `messages`, and `refused`, "" for a cell that has run.
+            The record: `status` (n,); `numbers`, metric -> (n,); `messages`; `refused`, reason, or "" if the cell ran.
         """
         return self.records[cell.key]
 
@@ -121,7 +121,7 @@ class SweepTable:
         return [cell for cell in self.cells if cell.case.name == case and wanted <= cell.point.items()]
 
     def cell(self, case: str, at: Mapping[str, Any] | None = None) -> SweepCell:
-        """Return the one cell of a case at a point of the grid, which has run.
+        """Return the cell of a case at a point of the grid; the cell must have run.
 
         Args:
             case: name of the case.
@@ -143,7 +143,7 @@ class SweepTable:
         return cells[0]
 
     def passed(self, cell: SweepCell) -> np.ndarray:
-        """Return the mask of members of a cell that pass.
+        """Return a mask of the members of a cell: True for members that pass.
 
         Args:
             cell: one of `cells`.
@@ -188,7 +188,7 @@ class SweepTable:
         return self._probability(self.passed(self.cell(case, at)))
 
     def survival(self, case: str, times: Sequence[float], at: Mapping[str, Any] | None = None) -> list[Probability]:
-        """Return the probability that a member neither failed nor was stopped by each time.
+        """Return the probability that a member still runs at each time: it neither failed nor was stopped by an event.
 
         Args:
             case: name of the case.
@@ -232,7 +232,7 @@ class SweepTable:
             stop: member after the last; None (default) for all.
 
         Returns:
-            Values by name, each (stop - first,), in the order of `vary`; every name stands for one number.
+            Values by name, each (stop - first,), in the order of `vary`. A vector has one name for each of its entries.
         """
         assert cell.fleet is not None
         fleet, stop = cell.fleet, cell.fleet.members if stop is None else stop
@@ -254,7 +254,7 @@ class SweepTable:
     def rows(self) -> list[dict[str, Any]]:
         """Return success with its interval, and mean, standard deviation and quantiles of each metric.
 
-        Metrics are taken over members that did not fail and whose number is finite; `missing` counts the others.
+        Metrics are summarised over members that did not fail and have a finite number; `missing` counts the others.
 
         Returns:
             One record for each cell: case, point, refused, members, failed, stopped, passed, success and metrics by name.
@@ -293,7 +293,7 @@ class SweepTable:
 
     @property
     def table(self) -> xarray.Dataset:
-        """The rows as an xarray Dataset over cases and axes of the grid; a cell that was refused is NaN.
+        """The rows as an xarray Dataset over cases and axes of the grid; numbers of a refused cell are NaN.
 
         Raises:
             ImportError: xarray is not installed (extra: store).

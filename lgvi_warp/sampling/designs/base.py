@@ -27,8 +27,8 @@ Drawn = dict[str, np.ndarray]
 class Sampling(Documented):
     """Arrangement of the members' points in the unit cube.
 
-    Class attributes: `kind` is the name in a scene file; `fewer` is True if a run may use only the first of the members
-    that the sampling contains.
+    Class attributes: `kind` is the name in a scene file. `fewer` is True if a run may use fewer members than the
+    sampling contains; it then uses the first ones.
 
     Raises:
         SceneError: If a setting is wrong. The message lists every fault.

@@ -23,16 +23,16 @@ Factors = tuple[tuple[str, tuple[int, ...]], ...]
 
 @dataclass(frozen=True)
 class Saltelli(Sampling):
-    """Design for Sobol indices, in the order of SALib.sample.sobol: groups of 2 d + 2 members.
+    """Design for Sobol indices, as SALib.sample.sobol: groups of 2 d + 2 members, for d factors.
 
-    d is the number of factors: the entries that vary independently, and each joint distribution. A group consists of
-    points A and B of one Sobol sequence, A with each factor of B, and B with each factor of A. Groups may be added; a
-    power of two of groups is balanced. Saltelli et al. (2010), Computer Physics Communications 181.
+    A factor is an entry that varies independently, or a joint distribution. A group consists of points A and B of one
+    Sobol sequence, A with one factor of B at a time, and B with one factor of A at a time. More groups can be added; a
+    number of groups that is a power of two is balanced. Saltelli et al. (2010), Computer Physics Communications 181.
 
     Args:
-        second_order: True, the default, allows second-order indices; without them groups have d + 2 members.
+        second_order: True, the default, allows second-order indices; False gives groups of d + 2 members.
         replicates: Number R of independently scrambled sequences, which are used in turn, group by group; 1 by default.
-        groups: Name -> names of factors that form one factor, "current.velocity" for all its entries; by default none.
+        groups: Name -> names of factors that form one factor; "current.velocity" names all entries; by default none.
 
     Raises:
         SceneError: If a setting is wrong. The message lists every fault.
@@ -69,10 +69,10 @@ class Saltelli(Sampling):
         return content
 
     def factors(self, space: Space) -> Factors:
-        """Label and columns of each factor; a group is at the place of its first factor.
+        """Label and columns of each factor; a group of factors has the place of its first factor.
 
         Args:
-            space: The cube: which names vary, with how many columns each.
+            space: The unit cube: the varied names with their numbers of columns.
         """
         group_of = {
             label: name for name, members in self.groups or () for member in members for label in _labels(space, member)
@@ -105,10 +105,10 @@ class Saltelli(Sampling):
         super().check(faults, space, members)
 
     def replicate_of(self, groups: np.ndarray) -> np.ndarray:
-        """Index of the sequence of each group.
+        """Index of the Sobol sequence to which each group of members belongs.
 
         Args:
-            groups: Indices of groups, (n,).
+            groups: Indices of n groups, (n,).
         """
         return groups % self.replicates
 
@@ -125,13 +125,13 @@ class Saltelli(Sampling):
         return space.split(np.where(self.rows(space)[row], AB[:, D:], AB[:, :D]))
 
     def rows(self, space: Space) -> np.ndarray:
-        """Columns that each member of a group takes from point B.
+        """Mask of the columns that each member of a group takes from point B; it takes the others from point A.
 
         Args:
-            space: The cube: the varied names with their numbers of columns.
+            space: The unit cube: the varied names with their numbers of columns.
 
         Returns:
-            Mask (group size, dimensions).
+            Mask (group size, dimensions of the cube).
         """
         factors = self.factors(space)
         from_B = np.zeros((len(factors), space.dimensions), dtype=bool)
@@ -148,17 +148,17 @@ def _labels(space: Space, name: str) -> list[str]:
 
 @dataclass(frozen=True)
 class Morris(Sampling):
-    """Design of Morris's screening (SALib.sample.morris): paths of d + 1 members, each step of which changes one factor.
+    """Morris's screening design (SALib.sample.morris): paths of d + 1 members, d factors; each step changes one factor.
 
-    Each side of the cube is divided into parts, and a member is in the middle of a part, so that unbounded
-    distributions give finite values. Paths may be added. It needs SALib (extra: uq). Morris (1991), Technometrics 33;
-    Campolongo, Cariboni & Saltelli (2007).
+    Each side of the unit cube is divided into equal parts, and members lie in the middle of parts, so that unbounded
+    distributions give finite values. More paths can be added. The design needs SALib (extra: uq). Morris (1991),
+    Technometrics 33; Campolongo, Cariboni & Saltelli (2007).
 
     Args:
-        levels: Number of parts of each side, even, from 4; 4 by default.
+        levels: Number of parts of each side of the cube, an even number of at least 4; 4 by default.
 
     Raises:
-        SceneError: If levels is not an even number from 4.
+        SceneError: If levels is not an even number of at least 4.
     """
 
     levels: int = 4
@@ -188,14 +188,14 @@ class Morris(Sampling):
         return space.split((x * (self.levels - 1) + 0.5) / self.levels)
 
     def design(self, space: Space, members: np.ndarray) -> np.ndarray:
-        """The design in SALib's levels.
+        """The design as SALib returns it.
 
         Args:
-            space: The cube: the varied names with their numbers of columns.
-            members: Indices of the members, (n,).
+            space: The unit cube: the varied names with their numbers of columns.
+            members: Indices of the n members, (n,).
 
         Returns:
-            Multiples of 1 / (levels - 1) from 0 to 1, (n, dimensions).
+            Multiples of 1 / (levels - 1) from 0 to 1, (n, dimensions of the cube).
 
         Raises:
             ImportError: If SALib is not installed.

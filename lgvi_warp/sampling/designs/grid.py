@@ -20,14 +20,15 @@ from lgvi_warp.sampling.distributions.basic import Choice
 
 @dataclass(frozen=True, eq=False)
 class Grid(Sampling):
-    """A full grid: every combination of the values of all names; the last name changes fastest.
+    """Full grid: every combination of the values of all names; the last name changes fastest.
 
-    Names of `vary` that the grid does not contain are drawn at random. The number of members is the number of combinations.
+    The number of members is the number of combinations. Names of `vary` that the grid does not contain are drawn at
+    random.
 
     Args:
-        axes: Name -> a list of values (of an entry such as "start.position[2]", or of the whole quantity), or a number
-            of levels: the medians of this number of equally probable parts of the name's distribution in `vary`, for
-            each of its entries.
+        axes: Name -> a list of values, of an entry such as "start.position[2]" or of the whole quantity; or name -> a
+            number of levels. The distribution of the name in `vary` is then divided into this number of equally
+            probable parts, and the medians of the parts are the values; a vector has this number for each entry.
 
     Raises:
         SceneError: If an axis is neither a list of values nor a number of levels. The message lists every fault.

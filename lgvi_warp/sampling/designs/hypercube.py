@@ -20,14 +20,15 @@ LARGEST_GROUP = 2**20
 
 @dataclass(frozen=True)
 class LatinHypercube(Replicated):
-    """Groups of members, each a Latin hypercube: every column has one member in each of `group` equal parts.
+    """Latin hypercubes: in each group of members, every column has one member in each of `group` equal parts.
 
-    Members are added group by group, and names may be added. McKay, Beckman & Conover (1979); scipy.stats.qmc.LatinHypercube.
+    Members are added group by group. Adding a name to `vary` does not change the values of the other names. McKay,
+    Beckman & Conover (1979); scipy.stats.qmc.LatinHypercube.
 
     Args:
-        group: Number of members in a hypercube, 2 to 2^20; required. The number of members must be a multiple of it.
-        replicates: Number R of hypercubes that are filled together: successive members go to each in turn; 1 by
-            default.
+        group: Number of members in a hypercube, 2 to 2^20; required. The number of members must be a multiple of
+            `group` times `replicates`.
+        replicates: Number R of hypercubes that are filled together, by one member each in turn; 1 by default.
 
     Raises:
         SceneError: If a setting is wrong. The message lists every fault.

@@ -15,10 +15,11 @@ from lgvi_warp.sampling.designs.space import Space
 
 @dataclass(frozen=True)
 class Random(Sampling):
-    """Independent random numbers from the seed, the member's index and the name. Members and names may be added.
+    """Independent random numbers, which depend only on the seed, the member's index and the name of the quantity.
 
-    It is the default of `lw.Ensemble`. The error of a mean falls with the square root of the number of members;
-    `LatinHypercube` and `Sobol` fill the cube more evenly. The generator is Philox (Salmon et al. 2011).
+    So adding members or varied names does not change the other numbers. `Random` is the default of `lw.Ensemble`. The
+    error of a mean falls with the square root of the number of members; `LatinHypercube` and `Sobol` fill the cube more
+    evenly. The generator is Philox (Salmon et al. 2011).
     """
 
     kind: ClassVar[str] = "random"

@@ -21,13 +21,14 @@ SOBOL_BITS = 32
 
 @dataclass(frozen=True)
 class Sobol(Replicated):
-    """A scrambled Sobol sequence (linear matrix scramble and digital shift, scipy.stats.qmc.Sobol): member i is point i.
+    """Scrambled Sobol sequence (linear matrix scramble and digital shift, scipy.stats.qmc.Sobol): member i is point i.
 
-    Members may be added; powers of two of members are balanced. Varying another name changes the sequence.
+    More members can be added without changing the first ones. A number of members that is a power of two is balanced.
+    Varying another name changes the whole sequence.
 
     Args:
-        replicates: Number R of independently scrambled sequences, which are used in turn, member by member; 1 by
-            default.
+        replicates: Number R of independently scrambled sequences, which are used in turn, member by member: member i is
+            then point i // R of sequence i mod R; 1 by default.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -82,13 +83,13 @@ def _sobol_basis(seed: int, name: str, dimensions: int, bits: int, scramble: boo
 
 @dataclass(frozen=True)
 class Halton(Replicated):
-    """A scrambled Halton sequence (random permutations of digits, scipy.stats.qmc.Halton): member i is point i.
+    """Scrambled Halton sequence (random permutations of digits, scipy.stats.qmc.Halton): member i is point i.
 
-    Any number of members may be added. Varying another name changes the sequence.
+    Any number of members can be added without changing the first ones. Varying another name changes the whole sequence.
 
     Args:
-        replicates: Number R of independently scrambled sequences, which are used in turn, member by member; 1 by
-            default.
+        replicates: Number R of independently scrambled sequences, which are used in turn, member by member: member i is
+            then point i // R of sequence i mod R; 1 by default.
     """
 
     kind: ClassVar[str] = "halton"

@@ -31,25 +31,25 @@ BINARY = (b"\x93NUMPY", b"PK\x03\x04", b"\x1f\x8b")
 
 @dataclass(frozen=True, eq=False)
 class Table(Sampling):
-    """Values of every member: from a CSV file whose first line names the columns, or from arrays by name.
+    """Table with the values of every member: a CSV file whose first line names the columns, or arrays by name.
 
     Names of `vary` that the table does not contain are drawn at random. By default, the number of members is the number
-    of lines; with fewer members, the first lines are used. Lines may be added.
+    of lines; with fewer members, the first lines are used. Lines can be added at the end.
 
     Args:
         file: Path of the file. Its columns are numbers of the scene or their entries, such as "vehicle.mass" or
             "start.position[2]" (quote a name that contains a comma), separated by commas, semicolons or tabs. Empty
             lines and lines that begin with # are skipped.
-        values: Arrays (n,) or (n, *shape) by name, instead of a file; or a data frame, a structured array or an xarray
-            Dataset with such names. It may be a posterior by chain and draw (ArviZ: idata.posterior); its draws are the
-            members.
-        sha256: Checksum that the file must have, as written by `to_dict`; by default it is not checked.
+        values: Arrays (n,) or (n, *shape) by name, for n members, instead of a file; or a data frame, a structured
+            array or an xarray Dataset with these names. A Dataset may be a posterior with chains and draws (ArviZ:
+            idata.posterior); each draw is a member.
+        sha256: Checksum that the file must have, as written by `to_dict`; by default the file is not checked.
         columns: Names of the columns to use; all by default.
         ignore: Names of the columns to leave out, such as an id; none by default.
-        weights: Statistical weights of the members: the name of a column, or numbers (n,), at least 0, in any scale.
-            The members then represent a different distribution from the one that they were drawn from. The weight of a
-            member is the ratio of the two densities (importance sampling), or the weight of a posterior draw. By
-            default equal.
+        weights: Statistical weights of the members: the name of a column, or numbers (n,) of at least 0, on any scale.
+            The members then represent another distribution than the one from which they were drawn. A member's weight
+            is the ratio of the two densities (importance sampling), or the weight of a posterior draw. By default all
+            weights are equal.
 
     Raises:
         SceneError: If the file cannot be read, or a cell has no number. The message lists every fault.
@@ -100,7 +100,7 @@ class Table(Sampling):
             values: Columns by name, (n,) or (n, *shape).
 
         Returns:
-            The table, even if the file no longer exists.
+            The table. The file need not exist any more.
 
         Raises:
             SceneError: If the values are not columns of one length.

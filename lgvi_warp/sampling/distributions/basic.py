@@ -169,7 +169,7 @@ class Normal(Distribution):
     Args:
         std: Standard deviation, in the unit of the quantity.
         relative: Standard deviation as a fraction of the scene's value; instead of `std`.
-        mean: Mean; by default the scene's value.
+        mean: Mean, in the unit of the quantity; by default the scene's value.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -195,13 +195,13 @@ class Normal(Distribution):
 
 @dataclass(frozen=True)
 class Uniform(Distribution):
-    """Uniform distribution: from low to high, or about the scene's value.
+    """Uniform distribution: between two ends, or about the scene's value.
 
     Args:
-        low: Lower end; requires `high`.
+        low: Lower end, in the unit of the quantity; requires `high`.
         high: Upper end; requires `low`.
         half_width: Largest distance from the scene's value; instead of `low` and `high`.
-        relative: Largest distance as a fraction of the scene's value; instead of `half_width`.
+        relative: Largest distance from the scene's value, as a fraction of this value; instead of `half_width`.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -233,10 +233,10 @@ class Uniform(Distribution):
 
 @dataclass(frozen=True)
 class LogNormal(Distribution):
-    """Log-normal distribution: median * exp(sigma Z) with a standard normal Z. Values have the sign of the median.
+    """Log-normal distribution: median * exp(sigma Z), Z standard normal. Values have the sign of the median.
 
     Args:
-        sigma: Standard deviation of the logarithm.
+        sigma: Standard deviation of the logarithm of the quantity.
         median: Median; by default the scene's value.
     """
 
@@ -311,12 +311,12 @@ class TruncatedNormal(Distribution):
 
 @dataclass(frozen=True)
 class Choice(Distribution):
-    """One of several values, with probabilities proportional to weights.
+    """Discrete distribution: one of k values, with probabilities proportional to weights.
 
     Args:
-        values: (k,): every entry of the quantity independently gets one of these numbers; (k, *shape): the whole
-            quantity gets one of these values.
-        weights: Weights (k,), at least 0; equal by default.
+        values: Numbers (k,): each entry of the quantity independently gets one of them. Or values (k, *shape): the
+            whole quantity gets one of them.
+        weights: Weights of the k values, (k,), at least 0; equal by default.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -357,7 +357,7 @@ class Choice(Distribution):
         return f"has values of shape {shape}", f"give values of shape {shapes[0]}"
 
     def size(self, bases: Sequence[np.ndarray]) -> int:
-        """Number of uniform numbers, always 1: a single number chooses a whole value.
+        """Number of uniform numbers for one draw: always 1, since one number selects a value of the whole quantity.
 
         Args:
             bases: The scene's value of the quantity.
@@ -371,7 +371,7 @@ class Choice(Distribution):
         """Draw values of the whole quantity.
 
         Args:
-            u: Levels (n, 1).
+            u: Levels (n, 1) in (0, 1), for n members.
             bases: The scene's value of the quantity, as the only entry.
 
         Returns:

@@ -19,17 +19,17 @@ from lgvi_warp.sampling.distributions.named import as_distribution
 
 @dataclass(frozen=True, eq=False)
 class Copula(JointLaw):
-    """Several numbers that are correlated by a Gaussian copula, each with its own distribution.
+    """Joint distribution of d numbers, each with its own distribution, correlated by a Gaussian copula.
 
     The numbers are the entries of a vector, or of several quantities, named "a, b" in `vary`.
 
     Args:
-        correlation: Correlation (d, d) of the normal scores; the correlation of the numbers is slightly closer to 0 if
-            their distributions are not normal. From rank correlations: 2 sin(pi s / 6) for Spearman's s, sin(pi t / 2)
+        correlation: Correlation (d, d) of the normal scores. If the distributions are not normal, the correlation of
+            the numbers is slightly closer to 0. From rank correlations: 2 sin(pi s / 6) for Spearman's s, sin(pi t / 2)
             for Kendall's t.
         marginals: Distribution of each number: a list in the order of the names, or a mapping of names to
-            distributions. A distribution may be any of lgvi_warp, a frozen one of scipy.stats, or an object with
-            quantiles.
+            distributions. A distribution may be one of lgvi_warp, a frozen distribution of scipy.stats, or an object
+            with quantiles.
 
     Raises:
         SceneError: If the matrix is not a correlation matrix, or a marginal is not a distribution of a single number.

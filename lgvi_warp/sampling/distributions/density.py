@@ -23,17 +23,18 @@ AT_ONCE = 4_000_000
 
 @dataclass(frozen=True, eq=False)
 class KernelDensity(JointLaw):
-    """Gaussian kernel density of draws, such as posterior draws: of one number, or jointly of several.
+    """Gaussian kernel density of draws, such as posterior draws: of one number, or of several numbers jointly.
 
-    Its values are absolute: the scene's own value is not used. The density is the mean of normal distributions about
-    the draws. For one number, values rise with the level, so that Sobol points and other designs remain evenly spread.
-    For several numbers, one level selects a draw, and the other levels select the displacement from it.
+    Its values are absolute: the scene's own value is not used. The density is the mean of normal distributions
+    (kernels) about the draws. For one number, the value rises with the level, so that Sobol points and other designs
+    remain evenly spread. For several numbers, one level selects a draw, and the other levels select the displacement
+    from this draw.
 
     Args:
-        draws: Draws (n,) of one number, or (n, d) jointly of d numbers: the entries of a vector, or of several
+        draws: n draws, (n,) of one number or (n, d) of d numbers jointly: the entries of a vector, or of several
             quantities, named "a, b" in `vary`.
-        bandwidth: Standard deviation of the kernels, in the unit of the quantity: one number, or (d,). By default Scott's
-            rule: the covariance of the kernels is the covariance of the draws times n^(-2 / (d + 4)).
+        bandwidth: Standard deviation of the kernels, in the unit of the quantity: one number, or (d,). By default
+            Scott's rule: the covariance of the kernels is the covariance of the draws times n^(-2 / (d + 4)).
 
     Raises:
         SceneError: If the draws do not vary or are fewer than 2, or a bandwidth is not above 0.

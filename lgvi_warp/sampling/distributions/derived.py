@@ -17,16 +17,16 @@ from lgvi_warp.sampling.distributions.named import as_distribution
 
 
 class Derived(JointLaw):
-    """Numbers computed from one random factor, or a few: vary = {"drag.quadratic": Derived({...}, k=...)}.
+    """Numbers computed from one or a few random factors: vary = {"drag.quadratic": Derived({...}, k=...)}.
 
-    The key in `vary` names the same numbers as the mapping, such as "drag.linear, drag.quadratic". A file cannot store
-    functions, so a run that is read from a file needs the ensemble again.
+    The key in `vary` lists the same numbers as `functions`, such as "drag.linear, drag.quadratic". A file cannot store
+    functions: to use a run that was read from a file, give the ensemble again.
 
     Args:
-        functions: Name of a number -> function that returns the number of each member. The function's arguments have
-            the names of the factors; each is an array that can be multiplied by the scene's value of the number.
-        factors: Distribution of each factor, for a single number. A distribution that is otherwise about the scene's
-            value is about 1 here.
+        functions: Name of a number -> function that returns the number of each member. The arguments of the function
+            are factors, by name; each is an array that can be multiplied by the scene's value of the number.
+        factors: Distribution of each factor, for a single number. Where a distribution otherwise uses the scene's value
+            (for example as its mean), it uses 1 here.
 
     Raises:
         SceneError: If an entry is not a function or not a distribution, or if an argument of a function is not a

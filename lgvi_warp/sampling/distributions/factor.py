@@ -17,12 +17,12 @@ from lgvi_warp.sampling.distributions.named import as_distribution
 
 @dataclass(frozen=True, eq=False)
 class Factor(JointLaw):
-    """One random factor per member for all entries of a scene's number, or of several numbers, named "a, b" in `vary`.
+    """One random factor per member, which multiplies all entries of a number, or of several named "a, b" in `vary`.
 
     In a scene file: "drag_matrix.quadratic" = { factor = { uniform = { low = 0.8, high = 1.2 } } }.
 
     Args:
-        law: Distribution of the factor. A distribution that is otherwise about the scene's value is about 1 here.
+        law: Distribution of the factor. Where it otherwise uses the scene's value (such as its mean), it uses 1 here.
 
     Raises:
         SceneError: If `law` is not a distribution of a single number.

@@ -151,15 +151,15 @@ class Levels(JointLaw):
 
 @dataclass(frozen=True)
 class CorrelatedNormal(JointLaw):
-    """Normal distribution with a covariance between the entries of one quantity, or of several, named "a, b" in `vary`.
+    """Joint normal distribution of d entries of one quantity, or of several quantities, named "a, b" in `vary`.
 
-    The entries of a symmetric matrix are those on and above the diagonal; of a diagonal matrix, those on the diagonal.
+    Of a symmetric matrix, only the entries on and above the diagonal count; of a diagonal matrix, the diagonal entries.
 
     Args:
         covariance: Covariance (d, d), in the units and order of the entries; it may be singular.
-        std: Standard deviation, one number or (d,); instead of `covariance`.
+        std: Standard deviation of the entries, one number or (d,); instead of `covariance`.
         correlation: Correlation (d, d), together with `std`; by default the entries are independent.
-        mean: Mean, one number or (d,); by default the scene's values.
+        mean: Mean of the entries, one number or (d,); by default the scene's values.
 
     Raises:
         SceneError: If the matrix is not positive semidefinite or the numbers do not fit. The message lists every fault.
@@ -229,11 +229,11 @@ class AttitudeDistribution(JointLaw):
 class RotationNormal(AttitudeDistribution):
     """Concentrated normal distribution of an attitude, R = R0 exp(hat(v)); for "start.attitude".
 
-    R0 is the scene's attitude, and v is normal with mean 0, in body axes. Barfoot & Furgale (2014), Associating
-    uncertainty with three-dimensional poses, with the perturbation on the body's side.
+    R is the drawn attitude and R0 the scene's. v is a rotation vector in body axes, normal with mean 0. As Barfoot &
+    Furgale (2014), Associating uncertainty with three-dimensional poses, but with the rotation in body axes.
 
     Args:
-        std: Standard deviation of v about the body axes, one number or (3,) [rad].
+        std: Standard deviation of v about each body axis, one number or (3,) [rad].
         covariance: Covariance of v, (3, 3) [rad^2]; instead of `std`.
 
     Raises:
@@ -261,7 +261,7 @@ class RotationNormal(AttitudeDistribution):
 
 @dataclass(frozen=True)
 class UniformRotation(AttitudeDistribution):
-    """Uniform distribution of an attitude on SO(3) (Haar measure), for any scene attitude; for "start.attitude".
+    """Uniform distribution of "start.attitude" on SO(3) (Haar measure). The scene's attitude has no effect.
 
     Shoemake (1992), Uniform random rotations, in Graphics Gems III.
     """
@@ -278,15 +278,15 @@ class UniformRotation(AttitudeDistribution):
 
 @dataclass(frozen=True)
 class PositiveDefinite(JointLaw):
-    """Distribution of a symmetric positive definite matrix: A = L T T^T L^T, where L L^T is the scene's matrix.
+    """Distribution of a symmetric positive definite (d, d) matrix: A = L T T^T L^T; L L^T is the scene's matrix.
 
-    T is lower triangular, with exp(sigma z / 2) on the diagonal and off_diagonal z below it; each z is standard normal.
-    So for a diagonal matrix, the logarithm of each entry has standard deviation sigma, and its median is the scene's
-    value. Zeros of the scene, such as an absent added mass, remain zero. It follows the log-Cholesky coordinates of Lin
-    (2019), Riemannian geometry of symmetric positive definite matrices via Cholesky decomposition.
+    A is the drawn matrix. T is lower triangular, with exp(sigma z / 2) on the diagonal and off_diagonal z below; each z
+    is standard normal. So for a diagonal matrix, the logarithm of each diagonal entry has standard deviation sigma, and
+    its median is the scene's value. Zeros of the scene, such as an absent added mass, remain zero. Log-Cholesky
+    coordinates: Lin (2019), Riemannian geometry of symmetric positive definite matrices via Cholesky decomposition.
 
     Args:
-        sigma: Standard deviation of the logarithm, one number or (d,).
+        sigma: Standard deviation of the logarithm, as above: one number, or one for each row (d,).
         off_diagonal: Standard deviation of the entries of T below the diagonal; 0 by default.
     """
 
@@ -309,13 +309,13 @@ class PositiveDefinite(JointLaw):
         return f"has {np.asarray(self.sigma).size} sigmas for a {d} x {d} matrix", f"give one number or {d}"
 
     def unusable(self, base: np.ndarray) -> tuple[str, str] | None:
-        """Problem with the scene's matrix as the centre of the distribution.
+        """Find the reason why the scene's matrix cannot be the centre of the distribution.
 
         Args:
             base: The scene's matrix (d, d).
 
         Returns:
-            The fault and its remedy; None if the matrix is positive semidefinite.
+            The fault and its remedy; None if the matrix is positive semidefinite, so that it can be the centre.
         """
         if np.linalg.eigvalsh(base)[0] >= -ROUND_OFF * np.abs(base).max():
             return None
@@ -347,18 +347,18 @@ class PositiveDefinite(JointLaw):
 
 @dataclass(frozen=True)
 class PhysicalInertia(PositiveDefinite):
-    """Distribution of a rigid body's physical inertia: no principal inertia exceeds the sum of the other two.
+    """Distribution of physically possible inertias J: no principal inertia exceeds the sum of the other two.
 
-    It applies `PositiveDefinite` to the second moments of mass S = tr(J) / 2 - J, and returns J = tr(S) - S. An inertia
-    belongs to a distribution of mass if and only if S is positive definite (Wensing, Kim & Slotine 2018, Linear matrix
-    inequalities for physically consistent inertial parameter identification). Use it for "vehicle.inertia", whose scene
-    value must be physical, and for "vehicle.rigid_body_mass_matrix", with S about the centre of gravity, which stays
-    fixed.
+    The second moments of mass are S = tr(J) / 2 - J. `PositiveDefinite` draws S, and the inertia is J = tr(S) - S. A
+    mass distribution with inertia J exists if and only if S is positive definite (Wensing, Kim & Slotine 2018, Linear
+    matrix inequalities for physically consistent inertial parameter identification). Use it for "vehicle.inertia",
+    whose scene value must be physical, or for "vehicle.rigid_body_mass_matrix". For the latter, S is taken about the
+    centre of gravity, which stays fixed.
 
     Args:
         sigma: Standard deviation of the logarithm of the principal second moments, one number or (3,).
-        off_diagonal: Standard deviation of the entries below the diagonal of the factor of S; 0 by default.
-        mass_sigma: Standard deviation of the logarithm of the mass, for a 6x6 matrix; 0 by default.
+        off_diagonal: Standard deviation of the entries below the diagonal of T (see `PositiveDefinite`); 0 by default.
+        mass_sigma: Standard deviation of the logarithm of the mass, only for a 6x6 matrix; 0 by default.
 
     Examples:
         >>> import lgvi_warp as lw

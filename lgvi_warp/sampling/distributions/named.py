@@ -36,13 +36,13 @@ ADDRESS = re.compile(r" at 0x[0-9a-fA-F]+")
 class ScipyDistribution(Distribution):
     """A frozen distribution of scipy.stats: lw.distributions.ScipyDistribution(scipy.stats.gamma(2.0, scale=3.0)).
 
-    `vary` also accepts the scipy distribution itself. Its values are absolute: the scene's own value is not used.
+    `vary` also accepts the frozen distribution itself. Its values are absolute: the scene's own value is not used.
 
     Args:
         distribution: The frozen distribution; each parameter is one number, or one number per component.
 
     Raises:
-        SceneError: If it is not frozen, has no quantiles, or scipy refuses its numbers.
+        SceneError: If the distribution is not frozen, has no quantiles, or scipy refuses its parameters.
     """
 
     distribution: Any = None
@@ -103,9 +103,9 @@ class ScipyDistribution(Distribution):
         """Build a distribution from the dict of `to_dict`.
 
         Args:
-            key: Name of the varied quantity, with which faults begin.
-            kind: Name of the distribution in a scene file, or "scipy".
-            values: Parameters by name; with "scipy" also the name in scipy.stats.
+            key: Name of the varied quantity, for error messages.
+            kind: Name of the distribution in a scene file, or "scipy" for any distribution of scipy.stats.
+            values: Parameters by name; for "scipy" also the distribution's name in scipy.stats.
 
         Returns:
             The distribution.

@@ -50,8 +50,7 @@ class OfChannels(Total):
     """A metric of all channels of a signal, or of one channel. Abstract.
 
     Args:
-        of: "command" or "actuator", for the sum over all channels, regardless of their units; or one channel,
-            "command[2]".
+        of: "command" or "actuator", for the sum over all channels, whatever their units; or one channel, "command[2]".
     """
 
     def meant(self) -> Quantity:
@@ -68,10 +67,10 @@ _ALL = {name: all_of(name) for name in CHANNELS}
 
 @dataclass(frozen=True, eq=False)
 class Effort(OfChannels):
-    """The integral over time of |command|, summed over channels [unit of the commands, s]; then statistics over members.
+    """Metric: integral over time of |command|, summed over channels [unit of the commands, s].
 
-    A command counts from its tick to the next, which is exact, since it is held in between. Faults are included, delays
-    are not.
+    Each command counts until the next tick. This is exact, since commands are held between ticks. Faults are included,
+    delays are not.
 
     Args:
         of: "command" (the default), "actuator", or one channel, "command[2]".
@@ -87,10 +86,10 @@ class Effort(OfChannels):
 
 @dataclass(frozen=True, eq=False)
 class Travel(OfChannels):
-    """Travel of the actuators: |change| from tick to tick, summed over channels [unit of the commands]; then statistics.
+    """Metric: travel of the actuators, the sum of |change from tick to tick| over channels [unit of the commands].
 
     Args:
-        of: "actuator" (the default: actual positions after delay, fault, limit and lag), "command", or one channel.
+        of: "actuator", the default: actual positions after delay, fault, limit and lag; "command"; or one channel.
     """
 
     type: ClassVar[str] = "travel"
@@ -112,9 +111,9 @@ def _saturated(samples: Fields, members: Members) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class SaturationShare(OfOne, Total):
-    """Fraction of each member's time under way with some command at or beyond its limit [1]; then statistics over members.
+    """Metric: fraction of a member's running time during which some command is at or beyond its limit [1].
 
-    Limits are the `limit` of the terms that take the commands; a term without a limit never saturates.
+    The limit is the parameter `limit` of the term that receives the command. A term without a limit never saturates.
 
     Args:
         of: "command", the default.
@@ -145,12 +144,13 @@ def _wrench_and_twist(samples: Fields, members: Members) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class ActuatorEnergy(OfOne, Total):
-    """The integral over time of the |power| of the actuators' wrench on the motion [J]; then statistics over members.
+    """Metric: mechanical energy of the actuators [J], the integral over time of the |power| of their wrench.
 
-    The power is exerted . (velocity, angular velocity). `exerted` is the wrench after limits, lags, the loss by the
-    advance speed, and faults, known to the controller or not. Between ticks the trapezoidal rule applies; without lags,
-    limited rates and delays, the wrench of a tick is held until the next tick. The energy is mechanical, without the
-    losses of motors and propellers. `ElectricalEnergy` includes these losses, in a scene with an energy account.
+    The power is the product of `exerted` with velocity and angular velocity. `exerted` is the actuators' wrench after
+    limits, lags, the loss by the advance speed, and all faults, known to the controller or not. Between ticks the
+    trapezoidal rule applies. Without lags, limited rates and delays, the wrench of a tick is held until the next tick.
+    The losses of motors and propellers are not included. `ElectricalEnergy` includes them, if the scene has an energy
+    account.
 
     Args:
         of: "exerted", the default.
@@ -177,10 +177,10 @@ class ActuatorEnergy(OfOne, Total):
 
 @dataclass(frozen=True, eq=False)
 class ElectricalEnergy(OfOne, Total):
-    """The energy that each member uses [J], by the account of `lw.terms.EnergyUse`; then statistics over members.
+    """Metric: electrical energy that a member uses [J], from the account of `lw.terms.EnergyUse`.
 
-    It is the electrical energy used between the first and the last tick, with the hotel load and all losses that the
-    terms define. In a sweep over a scene with this account, "energy" also means this metric.
+    It counts from the first to the last tick, with the hotel load and all losses that the terms define. In a sweep over
+    a scene with this account, "energy" also names this metric.
 
     Args:
         of: "energy_used", the default.
@@ -197,10 +197,10 @@ class ElectricalEnergy(OfOne, Total):
 
 @dataclass(frozen=True, eq=False)
 class TimeToFailure(OfOne):
-    """Time at which each member failed or an event stopped it [s], else infinite; then statistics over members.
+    """Metric: time at which a member failed or an event stopped it [s]; infinite if it ran to the end.
 
-    Only lw.statistics.MemberValues() includes all members: other statistics exclude infinite times and failed members.
-    lw.statistics.Outcome gives the probability that a member has ended by each time.
+    Only lw.statistics.MemberValues() includes all members. Other statistics leave out infinite times and failed
+    members. lw.statistics.Outcome gives the probability that a member has ended by each time.
 
     Args:
         of: "end", the default.
@@ -232,17 +232,17 @@ class TickSamples(dict[str, np.ndarray]):
 
 @dataclass(frozen=True, eq=False)
 class CustomMetric(Metric):
-    """A custom metric: a function that is called at each tick of a block of members; then statistics over members.
+    """Custom metric: a function of your own that is called at each tick for a block of n members.
 
-    The function is called as function(state, tick). `state` is None at the first tick, then the return value at the
-    tick before. `tick` has the samples of n members by name, such as tick["position"] (n, 3), and tick.t, tick.dt [s].
-    The function returns numbers (n,), or (m, n) for m numbers of each member. A member that is no longer under way
-    keeps its last state.
+    The function is called as function(state, tick). `state` is None at the first tick, then the value that the function
+    returned at the tick before. `tick` has the samples of the n members by name, such as tick["position"] (n, 3), and
+    tick.t, tick.dt [s]: the time, and the time since the last tick. The function returns numbers (n,), or (m, n) for m
+    numbers of each member. When a member stops or fails, its state no longer changes.
 
     Args:
         of: the function; the metric has its name.
         fields: names of the samples that the function reads, as for lw.SaveAt.
-        last: function from the last state to the metric (n,); by default the metric is the last state.
+        last: function that computes the metric (n,) from the last state; by default the metric is the last state.
         unit_of: unit of the metric, a text; by default "1".
         version: text or number that identifies the functions in sweeps and stores; change it whenever the functions
             change. None, the default: their code identifies them.

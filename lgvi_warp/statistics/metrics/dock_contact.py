@@ -29,19 +29,19 @@ FIELDS = ("position", "attitude", "velocity")
 
 @dataclass(frozen=True, eq=False)
 class DockContact(Metric):
-    """First passage of each member through the plane of its dock within its mouth; then statistics over members.
+    """Metric: one number of a member's first passage through the plane of its dock, within the mouth.
 
-    The dock belongs to a guidance `lw.control.Docking`. Between two ticks the path is the cubic through their positions
+    A guidance `lw.control.Docking` defines the dock. Between two ticks the path is the cubic through their positions
     and velocities. A member that did not dock has no number (NaN), and is left out of statistics.
 
     Args:
         of: "speed": speed over ground along the centre line [m/s]; "offset": distance of the body's origin from the
             centre line [m]; "heading_error": heading minus the dock's heading, in [-pi, pi] [rad]; "time": time of the
-            entry [s].
+            passage [s].
         docking: name of the guidance; by default "docking".
 
     Raises:
-        SceneError: if `of` is none of these; or, at the start of a run, if the scene has no such guidance.
+        SceneError: if `of` is none of these names; or, at the start of a run, if the scene has no such guidance.
 
     Examples:
         >>> import lgvi_warp as lw

@@ -106,17 +106,17 @@ class _Follow(Gatherer):
 
 @dataclass(frozen=True, eq=False)
 class Metric(MemberStatistic):
-    """One number of each member over all ticks of a controller, then statistics over members. Abstract.
+    """One number of each member, computed over all ticks of a controller, and statistics of it over members. Abstract.
 
-    It uses the samples at every tick, even if the run does not save them; without a controller, it uses the sample
-    times. The number of a member that stops or fails covers its time under way, up to its last tick. Statistics leave
-    out members that failed, and those whose number is not finite; lw.statistics.MemberValues() includes all members.
+    A metric uses the samples at every tick, even if the run does not save them; without a controller, it uses the
+    sample times. The number of a member that stops or fails covers its time until then, up to its last tick. Statistics
+    leave out members that failed or whose number is not finite; lw.statistics.MemberValues() includes all members.
 
     Args:
         of: the tracked quantity; see the derived classes.
-        then: Statistic of these numbers over the members, or a list of statistics, each without its `of`:
+        then: Statistic of the metric over the members, or a list of statistics, each without its `of`:
             lw.statistics.Mean(), the default, lw.statistics.Quantiles(), ...
-        measured: True uses the number that sensors measure instead of the true number; by default False.
+        measured: True uses the measured value of the sensors instead of the true value; by default False.
         stopped: not used by metrics; omit it.
     """
 

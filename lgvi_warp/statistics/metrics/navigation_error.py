@@ -25,19 +25,19 @@ UNITS = {"end": "m", "largest": "m", "percent": "%"}
 
 @dataclass(frozen=True, eq=False)
 class NavigationError(Metric):
-    """Length of each member's `navigation_error` (estimated minus true position); then statistics over members.
+    """Metric: size of a member's `navigation_error`, the estimated minus the true position.
 
-    "percent" is the error at the end divided by the length of the path over ground, by straight lines between ticks, as
-    manufacturers state the error of logs and inertial systems. It is NaN for a member that does not move.
+    "percent" is how manufacturers state the error of logs and inertial systems: the error at the end divided by the
+    distance travelled over ground, by straight lines between ticks. A member that does not move has NaN.
 
     Args:
-        of: "end", the default: error at the last tick under way [m]; "largest": largest error over all ticks of this
-            run [m]; "percent": error at the end as a percentage of the distance travelled [%], not for a run that
-            continues another.
+        of: "end", the default: error at the member's last tick [m]; "largest": largest error over all ticks of this run
+            [m]; "percent": error at the end in percent of the distance travelled [%], not for a run that continues
+            another.
         horizontal: True uses only the north and east components; by default False.
 
     Raises:
-        SceneError: if `of` is none of these; or, at the start of a run, if nothing estimates the position, or if
+        SceneError: if `of` is none of these names; or, at the start of a run, if nothing estimates the position, or if
             "percent" is requested for a run that continues another.
 
     Examples:

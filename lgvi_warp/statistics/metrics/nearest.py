@@ -80,15 +80,15 @@ def least_between(a: np.ndarray, b: np.ndarray, rate_a: np.ndarray, rate_b: np.n
 
 @dataclass(frozen=True, eq=False)
 class Nearest(Metric):
-    """Smallest distance of each member to an event [m], 0 if the event stopped it; then statistics over members.
+    """Metric: smallest distance of a member to an event [m]; 0 if the event stopped the member.
 
-    The distance is evaluated at every tick of the controller; without a controller, at the sample times. Between two
-    such times the path is the cubic through their positions and velocities, so they may be several steps apart. For a
-    member that failed, or that another event stopped, the path up to this time counts.
+    The distance is evaluated at every tick of the controller, or without a controller at the sample times. Between two
+    of these times the path is the cubic through both positions and velocities, so the times may be several steps apart.
+    For a member that failed, or that another event stopped, the path up to this end counts.
 
     Args:
         of: name of an event of the scene, such as "floor".
-        kind: type of the event, "floor", "surface" or "box"; by default its name.
+        kind: type of the event, "floor", "surface" or "box"; by default `of` is also the type.
 
     Raises:
         SceneError: if the event has another type; or, at the start of a run, if the scene has no such event.

@@ -23,11 +23,11 @@ ROUND_OFF = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class OfTracking(Metric):
-    """A metric of the tracking error e = desired - actual. Abstract.
+    """A metric of the tracking error e = desired - actual value. Abstract.
 
     Args:
         of: "depth", "heading" (differences wrapped to [-pi, pi]), "speed" (measured forward speed through the water),
-            "north", "east"; or a distance from the desired value: "position", "attitude" (angle), "cross_track".
+            "north", "east"; or, as a distance from the desired value, "position", "attitude" (angle) or "cross_track".
     """
 
     tracks: ClassVar[bool] = True
@@ -42,12 +42,13 @@ class OfCourse(Metric):
     """A metric of the approach to a goal. Abstract.
 
     The goal is constant: the set point of the scene at the first tick, before any reference model; with other guidance,
-    the desired value at the first tick. d is the goal minus the actual number, and the step s is d at the first tick.
+    the desired value at the first tick. d is the goal minus the actual value, and the step is d at the first tick.
     "Below" and "beyond" refer to the direction of the step, which is upward if the step is 0.
 
     Args:
         of: "depth", "heading", "speed", "north" or "east". The goal is the set point, before any reference model; with
-            other guidance, the desired value at the first tick. The step goes from the first actual value to the goal.
+            other guidance, the goal is the desired value at the first tick. The step is the change from the first
+            actual value to the goal.
     """
 
     tracks: ClassVar[bool] = True
@@ -74,8 +75,8 @@ class OfStep(OfCourse):
     """A step-response metric that may be given in percent of the step. Abstract.
 
     Args:
-        percent: True gives the number in percent of the step, like step_info of python-control; it is NaN if the step
-            is 0. By default False: in the unit of the quantity.
+        percent: True gives the metric in percent of the step, like step_info of python-control, and NaN if the step is
+            0. False, the default, gives it in the unit of the quantity.
     """
 
     percent: bool = False
@@ -91,10 +92,10 @@ class OfStep(OfCourse):
 
 @dataclass(frozen=True, eq=False)
 class Overshoot(Largest, OfStep):
-    """Largest distance of each member beyond its goal [unit, or % of the step], 0 if none; then statistics over members.
+    """Metric: largest distance of a member beyond its goal [unit of the quantity, or % of the step]; 0 if not beyond.
 
     Args:
-        percent: True gives it in percent of the step; by default False.
+        percent: True gives the metric in percent of the step, and NaN if the step is 0; by default False.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -121,10 +122,10 @@ class Overshoot(Largest, OfStep):
 
 @dataclass(frozen=True, eq=False)
 class Undershoot(Largest, OfStep):
-    """Largest distance of each member in the wrong direction [unit, or % of the step]; then statistics over members.
+    """Metric: largest distance of a member from its start, away from the goal [unit of the quantity, or % of the step].
 
     Args:
-        percent: True gives it in percent of the step; by default False.
+        percent: True gives the metric in percent of the step, and NaN if the step is 0; by default False.
     """
 
     type: ClassVar[str] = "undershoot"
@@ -138,7 +139,7 @@ class Undershoot(Largest, OfStep):
 
 @dataclass(frozen=True, eq=False)
 class PeakTime(OfCourse):
-    """First time at which each member is farthest in the direction of its step [s]; then statistics over members."""
+    """Metric: first time at which a member is farthest in the direction of its step [s]."""
 
     type: ClassVar[str] = "peak_time"
     form: ClassVar[str] = "s"
@@ -160,10 +161,10 @@ class PeakTime(OfCourse):
 
 @dataclass(frozen=True, eq=False)
 class Peak(Overshoot):
-    """Value of each member at its farthest point in the direction of its step [unit]; then statistics over members.
+    """Metric: value of the quantity where a member is farthest in the direction of its step [unit of the quantity].
 
-    A heading is not wrapped: it lies within pi of the goal. For a step from 0, the value is the Peak in step_info of
-    python-control.
+    A heading lies within pi of the goal and is not wrapped to [-pi, pi]. For a step from 0, the metric equals Peak in
+    step_info of python-control.
     """
 
     type: ClassVar[str] = "peak"
@@ -174,10 +175,10 @@ class Peak(Overshoot):
 
 @dataclass(frozen=True, eq=False)
 class RiseTime(OfCourse):
-    """Time of each member from 10 % to 90 % of its step [s]; then statistics over members.
+    """Metric: rise time of a member, from 10 % to 90 % of its step [s].
 
-    It lasts from the first tick at which at least 10 % of the step is done to the first tick with at least 90 %. It is
-    infinite if a member never gets there.
+    It lasts from the first tick at which at least 10 % of the step is done to the first tick at which at least 90 % is
+    done. It is infinite if a member never reaches 90 %.
 
     Args:
         limits: the two fractions of the step; by default (0.1, 0.9).
@@ -214,10 +215,10 @@ class RiseTime(OfCourse):
 
 @dataclass(frozen=True, eq=False)
 class SettlingTime(OfCourse):
-    """Time after which each member stays within a band about its goal [s]; then statistics over members.
+    """Metric: time after which a member stays within a band about its goal [s].
 
-    It is the time of the first tick from which |d| <= within at every tick under way; infinite for a member that is
-    outside the band at its last tick.
+    It is the time of the first tick from which on |goal - actual value| <= within at every tick of the member. It is
+    infinite for a member that is outside the band at its last tick.
 
     Args:
         within: half width of the band, in the unit of the quantity; by default 2 % of each member's step.
@@ -251,9 +252,9 @@ class SettlingTime(OfCourse):
 
 @dataclass(frozen=True, eq=False)
 class SteadyStateError(Total, OfTracking):
-    """The mean error over the ticks of the last part of the run [unit]; then statistics over members.
+    """Metric: mean of a member's error (desired minus actual value) over the ticks of the last part of the run [unit].
 
-    It is NaN for members that stopped or failed before the last tick.
+    The unit is that of the quantity. The metric is NaN for members that stopped or failed before the last tick.
 
     Args:
         share: the last part, as a fraction of the run's time, above 0 and up to 1; by default 0.1.
@@ -287,7 +288,7 @@ class SteadyStateError(Total, OfTracking):
 
 @dataclass(frozen=True, eq=False)
 class MaxError(Largest, OfTracking):
-    """The largest |e| of each member [unit]; then statistics over members."""
+    """Metric: largest |e| of a member [unit of the quantity]; e is the desired minus the actual value."""
 
     type: ClassVar[str] = "max_error"
 
@@ -297,9 +298,9 @@ class MaxError(Largest, OfTracking):
 
 @dataclass(frozen=True, eq=False)
 class CrossTrack(MaxError):  # noqa: N818  (no exception)
-    """Each member's largest horizontal distance from the line through the desired position along the desired velocity [m].
+    """Metric: largest horizontal distance from the line through the desired position along the desired velocity [m].
 
-    Without a desired velocity it is the distance from the desired position. Then statistics over members.
+    Without a desired velocity, it is the largest distance from the desired position.
 
     Args:
         of: "cross_track", the default.
@@ -323,7 +324,7 @@ class OverTime(Total, OfTracking):
 
 @dataclass(frozen=True, eq=False)
 class IAE(OverTime):
-    """The integral of |e| over time [unit s]; then statistics over members.
+    """Metric: integral of |e| over time [unit of the quantity, s]; e is the desired minus the actual value.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -346,7 +347,7 @@ class IAE(OverTime):
 
 @dataclass(frozen=True, eq=False)
 class ISE(OverTime):
-    """The integral of e^2 over time [unit^2 s]; then statistics over members."""
+    """Metric: integral of e^2 over time [unit of the quantity squared, s]; e is the desired minus the actual value."""
 
     type: ClassVar[str] = "ise"
     form: ClassVar[str] = "{0}^2 s"
@@ -355,7 +356,7 @@ class ISE(OverTime):
 
 @dataclass(frozen=True, eq=False)
 class ITAE(OverTime):
-    """The integral of t |e| over time [unit s^2]; then statistics over members."""
+    """Metric: integral of t |e| over time t [unit of the quantity, s^2]; e is the desired minus the actual value."""
 
     type: ClassVar[str] = "itae"
     form: ClassVar[str] = "{0} s^2"
@@ -364,7 +365,7 @@ class ITAE(OverTime):
 
 @dataclass(frozen=True, eq=False)
 class RMSError(ISE):
-    """Root mean square of e over the time under way [unit], |e| if this time is 0; then statistics over members."""
+    """Metric: root mean square of e over time (|e| for one tick) [unit of the quantity]; e: desired minus actual."""
 
     type: ClassVar[str] = "rms"
     form: ClassVar[str] = "{0}"

@@ -20,11 +20,11 @@ from lgvi_warp.statistics.values.values import Values
 class MemberValues(Statistic):
     """The numbers of all members, in the order of the members: eight bytes per member, component and row.
 
-    Use it in `then`, which has one row: lw.metrics.Overshoot("depth", then=[lw.statistics.Mean(),
-    lw.statistics.MemberValues()]). For a metric it includes the numbers of failed members; otherwise the numbers of
-    members that are left out are NaN. It has no interval.
+    Use it mostly in `then` of another statistic, which has one row: lw.metrics.Overshoot("depth",
+    then=[lw.statistics.Mean(), lw.statistics.MemberValues()]). The values of a metric include the numbers of failed
+    members; otherwise the number of a member that is left out is NaN. There is no interval.
 
-    Arrays of the estimate:
+    Arrays of the estimate, for k rows (sample times), d components and n members:
 
     * value (k, d, n): the numbers.
     * count (k,): number of members that have numbers, including infinite numbers.
@@ -33,7 +33,8 @@ class MemberValues(Statistic):
         of: A quantity, such as "depth" or "position[2]", a function of (samples, members), or a list of these
             (see lw.statistics.Quantity).
         name: Key of the estimate in the result; by default the type and the quantity, as in "mean position".
-        stopped: "held" keeps a member that an event stopped in its last state; "left_out" excludes it from then on.
+        stopped: After an event stopped a member, "held" counts the member with its last state; "left_out" leaves it
+            out.
 
     Examples:
         >>> import lgvi_warp as lw

@@ -59,10 +59,10 @@ class _Walk(Gatherer):
 
 @dataclass(frozen=True, eq=False)
 class OfPath(MemberStatistic):
-    """One number for each component of each member's whole path, then statistics of this number. Abstract.
+    """One number for each component of each member's whole path, and statistics of this number over members. Abstract.
 
-    Members that failed are left out, since the rest of their path is not known. The name of an estimate has both types:
-    "mean path_maximum speed". It has one row, at the end of the run.
+    Members that failed are left out, since the rest of their path is not known. The name of an estimate contains both
+    types of statistics: "mean path_maximum speed". The estimate has one row, at the end of the run.
 
     Args:
         of: A quantity, such as "depth" or "position[2]", a function of (samples, members), or a list of these
@@ -86,10 +86,10 @@ class OfPath(MemberStatistic):
 
 @dataclass(frozen=True, eq=False)
 class PathMaximum(OfPath):
-    """The largest value of a quantity over all sample times of each member, then statistics over members.
+    """Largest value of a quantity over all sample times of each member; `then` gives its statistics over members.
 
-    Members that failed are left out, since the rest of their path is not known. The name of an estimate has both types:
-    "mean path_maximum speed". It has one row, at the end of the run.
+    Members that failed are left out, since the rest of their path is not known. The name of an estimate contains both
+    types of statistics: "mean path_maximum speed". The estimate has one row, at the end of the run.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -106,7 +106,7 @@ class PathMaximum(OfPath):
 
 @dataclass(frozen=True, eq=False)
 class PathMinimum(OfPath):
-    """The smallest value of a quantity over all sample times of each member, then statistics over members."""
+    """Smallest value of a quantity over all sample times of each member; `then` gives its statistics over members."""
 
     type: ClassVar[str] = "path_minimum"
     _reduction: ClassVar[Reduction] = reductions.MINIMUM
@@ -114,7 +114,7 @@ class PathMinimum(OfPath):
 
 @dataclass(frozen=True, eq=False)
 class PathRange(OfPath):
-    """The largest minus the smallest value of a quantity over each member's sample times, then statistics over members."""
+    """Largest minus smallest value of a quantity over each member's samples; `then` gives statistics over members."""
 
     type: ClassVar[str] = "path_range"
     _reduction: ClassVar[Reduction] = reductions.RANGE
@@ -122,10 +122,10 @@ class PathRange(OfPath):
 
 @dataclass(frozen=True, eq=False)
 class PathMean(OfPath):
-    """The average over time of a quantity for each member, then statistics over members.
+    """Time average of a quantity for each member; `then` gives its statistics over members.
 
-    The quantity is linear between samples: trapezoidal rule over the sample times, divided by the time from the first
-    to the last. With a single sample it is this sample.
+    The quantity is assumed to be linear between samples: the trapezoidal integral is divided by the time from the first
+    to the last sample. For a single sample, the average is its value.
     """
 
     type: ClassVar[str] = "path_mean"
@@ -134,9 +134,9 @@ class PathMean(OfPath):
 
 @dataclass(frozen=True, eq=False)
 class PathRms(OfPath):
-    """The root mean square over time of a quantity for each member, then statistics over members.
+    """Root mean square over time of a quantity for each member; `then` gives its statistics over members.
 
-    The square is assumed to be linear between samples.
+    The square of the quantity is assumed to be linear between samples.
     """
 
     type: ClassVar[str] = "path_rms"
@@ -145,15 +145,15 @@ class PathRms(OfPath):
 
 @dataclass(frozen=True, eq=False)
 class PathTime(OfPath, Condition):
-    """Time [s] for which a condition holds for each member, then statistics over members: "mean path_time depth above 2".
+    """Total time [s] during which a condition holds for each member; `then` gives its statistics over members.
 
-    The quantity is linear between samples: an interval counts by the fraction of its line that satisfies the condition.
-    A quantity that is true or false has no line: half of an interval counts for each of its ends at which the condition
-    holds.
+    The name of an estimate is, for example, "mean path_time depth above 2". The quantity is assumed to be linear
+    between samples: an interval counts by the fraction of its line that satisfies the condition. For a quantity that is
+    true or false, half of an interval counts for each of its two ends at which the condition holds.
 
     Args:
         above: lower limit, one number or one for each component, in the quantity's unit.
-        below: upper limit, in the same form; with both, the time between them counts.
+        below: upper limit, in the same form. With both limits, the time between them counts.
     """
 
     type: ClassVar[str] = "path_time"

@@ -34,9 +34,9 @@ Function = Callable[["Fields", "Members"], np.ndarray]
 
 @dataclass(frozen=True)
 class Quantity:
-    """A quantity: a function of a block's samples, for k sample times and n members.
+    """Custom quantity: a function of the samples of a block, for k sample times and n members.
 
-    A member whose number is not finite is left out at that time.
+    If the number of a member is not finite at a time, statistics leave out the member at this time.
 
     Args:
         name: name in results and messages.
@@ -46,10 +46,10 @@ class Quantity:
         unit: unit of the numbers; by default "".
         fields: names of the samples that the function reads; by default all.
         labels: names of the d components; by default `name`, for one component.
-        needs_limit: True if a condition on the quantity needs a limit; by default False: the function may return true
+        needs_limit: True if a condition on the quantity needs a limit. By default False: the function may return true
             or false.
-        entries: (field, indices), counted from 0, for each field of the motion of which the function reads only these
-            components; at a controller's ticks the other components are NaN. By default none: it reads whole fields.
+        entries: (field, indices from 0) for each field of which the function reads only some components; at a
+            controller's ticks the other components are NaN. By default none: the function reads whole fields.
     """
 
     name: str

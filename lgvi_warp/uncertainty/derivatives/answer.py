@@ -20,10 +20,10 @@ ARRAYS = ("value", "jacobian", "error", "increments")
 
 @dataclass(frozen=True, eq=False)
 class Derivatives(Saved):
-    """Derivatives of a run's outputs with respect to numbers of its scene, made by `lw.derivatives`.
+    """Derivatives of a run's outputs with respect to numbers of its scene; the result of `lw.derivatives`.
 
-    m is the number of quantities, k the number of numbers. For a fleet of n members every array has a first axis of
-    members: (n, m, k).
+    m is the number of quantities and k the number of numbers. For a fleet of n members, arrays (m,) have the shape (n,
+    m), and arrays (m, k) the shape (n, m, k).
 
     Attributes:
         of: names of the quantities (m,).
@@ -31,15 +31,15 @@ class Derivatives(Saved):
         by: names of the numbers (k,).
         value: values of the quantities (m,).
         jacobian: derivative of each quantity by each number (m, k) [unit of quantity / unit of number]; NaN if undefined.
-        error: estimated error of each derivative (m, k), from the disagreement of differences at several increments,
-            and from round-off. It is not a bound: the true error is sometimes up to about 3 times as large. It excludes
-            the error of the method's step. NaN if there is no derivative.
-        increments: the largest increment that each derivative uses (m, k) [unit of the number]; NaN if undefined.
-        undefined: "quantity by number" -> sentence on the reason why it has no derivative.
+        error: estimated error of each derivative (m, k), from round-off and from the disagreement of differences at
+            several increments. It is no bound: the true error is sometimes about 3 times as large. The error of the
+            method's step is not included. NaN if undefined.
+        increments: the largest increment used for each derivative (m, k) [unit of the number]; NaN if undefined.
+        undefined: "quantity by number" -> sentence that gives the reason why this derivative is undefined.
         messages: notes for the user.
         members: number of copies of members that were run.
         provenance: scene, settings, versions and machine.
-        by_units: units of the numbers (k,), "1" if there is none.
+        by_units: units of the numbers (k,), "1" for a number without a unit.
 
     Examples:
         >>> import lgvi_warp as lw

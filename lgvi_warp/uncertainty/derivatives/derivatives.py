@@ -44,24 +44,24 @@ def derivatives(
 ) -> Derivatives:
     """Compute derivatives of a run's outputs with respect to numbers of the scene, each with an error estimate.
 
-    Copies of a member, with numbers changed by many increments to both sides, run with the member in one call, with the
-    same noise. Their differences are extrapolated, and the increments that agree best are used. A quantity that changes
-    in steps, or jumps, has no derivative: the answer gives the reason, and the entries are NaN.
+    A member runs in one call with copies of it, each with one number changed by one of several increments, and the same
+    noise. The differences are extrapolated, and the increments that agree best are used. A quantity that jumps or
+    changes in steps has no derivative: the answer gives the reason, and the entries are NaN.
 
     Args:
-        fleet: A Scene, whose [ensemble] is ignored; or an Ensemble, each member of which has its own derivatives.
+        fleet: A Scene, whose [ensemble] is ignored; or an Ensemble, for derivatives of each member.
         of: One or several quantities, as in `lw.prepare`: "position[2]", "max(depth)", "end_time floor",
             lw.metrics.ITAE("depth"), a function of a Result.
         by: Names of the numbers, as in `lw.prepare`: "vehicle.mass", "start.position[2]", "depth_pid.kp", ...
-        method: As in `lw.solve`, like all following settings; the scene's values are the defaults.
-        h: Step [s].
-        t1: End of the run [s].
-        save: Samples to keep; default those that the quantities need.
+        method: As in `lw.solve`; the scene's method by default.
+        h: Step [s]; the scene's step by default.
+        t1: End of the run [s]; the scene's duration by default.
+        save: Samples to keep; by default those that the quantities need.
         dtype: "float64", "float32" or "float32_compensated". In float32 derivatives have few digits.
         smooth: True turns off the rounding of sensor readings to their quantum. Default False.
-        seed: Seed of the noise, and of the members if they are drawn, a whole number from 0; default the ensemble's seed.
-        threads: Number of threads; default all cores, one for short runs.
-        width: Vehicles per packet; default from the CPU.
+        seed: Seed of the noise, and of the members if they are drawn, a whole number from 0; by default the ensemble's.
+        threads: Number of threads; by default all cores, or one for short runs.
+        width: Vehicles per packet; by default chosen for the CPU.
         executor: "threads" (default), "processes" or "dask", or an object that runs blocks.
         scheduler: Address of Dask's scheduler.
         progress: True shows a bar or lines, as in lw.solve; a function is called with the completed fraction of the
@@ -71,7 +71,7 @@ def derivatives(
         Values, derivatives with their errors, and the reasons for undefined derivatives.
 
     Raises:
-        SceneError: If arguments are faulty; one message lists all.
+        SceneError: If arguments are faulty; one message lists all faults.
 
     Examples:
         >>> import lgvi_warp as lw

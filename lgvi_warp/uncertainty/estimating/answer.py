@@ -16,30 +16,30 @@ from lgvi_warp.uncertainty.estimating.levels import Setting
 
 @dataclass(frozen=True, repr=False)
 class Estimated(Summarized, Saved):
-    """A statistic with its interval, made by `lw.estimate`.
+    """Estimate of a statistic with its interval; the result of `lw.estimate`.
 
     Attributes:
         of: name of the statistic.
         unit: unit of the value and of all errors.
         value: the estimate [`unit`].
-        interval: 95 % interval for sampling error and bias together, (low, high) [`unit`].
+        interval: 95 % interval, (low, high), which allows for sampling error and bias together [`unit`].
         error: requested root mean square error [`unit`].
         sampling_error: standard error of sampling [`unit`].
-        bias: estimated bias, the difference from a finer setting; it is not subtracted from the value [`unit`].
-        bias_interval: 95 % interval of the bias, including the finer setting's remaining bias, (low, high) [`unit`].
+        bias: estimated bias, the difference from a finer setting [`unit`]. It is not subtracted from the value.
+        bias_interval: 95 % interval of the bias, including the finer setting's own bias, (low, high) [`unit`].
         setting: the setting whose statistic is estimated, such as "psi_x 0.025".
         settings: this setting as arguments of `lw.solve`: method, h and dtype.
-        reference: text with the finer setting of the bias estimate, and its number of members.
+        reference: text that names the finer setting and the number of members from which the bias is estimated.
         estimator: "plain Monte Carlo", "sobol", "regression", "levels" or "levels of sobol".
         members: setting -> number of members that were run; pairs of settings are named "psi_x 0.025 less psi_x 0.2".
         seconds: processor time of all runs, including the pilot, without compiling [s].
         pilot_seconds: processor time of the pilot [s].
-        plain_seconds: predicted processor time of plain Monte Carlo in this setting, to the same error [s].
+        plain_seconds: predicted processor time of plain Monte Carlo in this setting, for the same error [s].
         own_seconds: the same prediction at the scene's own step; None if the scene has no step.
-        rivals: estimator -> predicted cost of plain Monte Carlo in this setting, divided by the estimator's.
+        rivals: estimator -> predicted cost of plain Monte Carlo divided by the cost of this estimator, in this setting.
         messages: notes for the user.
-        recipe: data to run the same members again, bit-identically, by lw.estimate(fleet, of, recipe=found.recipe):
-            seed, setting, estimator, and for each level settings, slopes, strata and members.
+        recipe: data with which lw.estimate(fleet, of, recipe=...) runs the same members again, bit-identically: seed,
+            setting, estimator, and for each level settings, slopes, strata and members.
         provenance: scene, ensemble, settings, versions and machine.
     """
 
@@ -70,7 +70,7 @@ class Estimated(Summarized, Saved):
 
     @property
     def error_reached(self) -> float:
-        """Root mean square of sampling error and bias [`unit`]."""
+        """Root mean square error reached: square root of sampling_error^2 + bias^2 [`unit`]."""
         return math.hypot(self.sampling_error, self.bias)
 
     def summary_rows(self) -> tuple[str, summaries.Rows]:

@@ -69,50 +69,50 @@ def estimate(
     """Estimate a mean, probability or quantile to a requested accuracy at the lowest cost.
 
     A pilot runs few members at several steps. It estimates the bias of each step, and the cost of plain Monte Carlo,
-    Sobol points, regression and levels (paired differences of fine and coarse settings). The cheapest estimator is then
-    run with numbers of members that are fixed beforehand.
+    Sobol points, regression and levels (paired differences of fine and coarse settings). The cheapest estimator then
+    runs with numbers of members that are fixed beforehand.
 
-    Choices depend on counted costs: steps times force evaluations per step. So one seed gives one answer, to the bit, on
-    any number of threads. `found.recipe` of the answer stores the choices, so that the same members can be run again later.
+    Choices use counted costs (steps times force evaluations per step), so the same seed gives the same answer, to the
+    bit, on any number of threads. `recipe` of the answer stores the choices, so that the same members can run again.
 
-    A sample of n members can miss a fraction of up to 3 / n of all members that behaves differently. To estimate the
-    effect of such members, 512 to 2,048 members spread over all input values are run, and probes far from the middle. A
-    message gives the fraction that a mean may have missed. Rare values of a Choice are separate strata.
+    A sample of n members can miss up to a fraction 3 / n of all members that behaves differently. To estimate its
+    effect, 512 to 2,048 members spread over all inputs, and members with extreme inputs, are run. A message gives the
+    fraction that a mean may have missed. Rare values of a Choice are separate strata.
 
     Args:
-        fleet: the ensemble, or a Scene with one. New members are drawn from its distributions; its sampling is not used.
+        fleet: the ensemble, or a Scene with one. Members are drawn anew from its distributions, without its sampling.
         of: statistic to estimate, at the end of the run: a text such as "mean position[0]", "depth above 3", "outcome
             floor" or "max(depth)"; lw.statistics.Mean, Exceedance, Outcome, FirstPassage or Quantiles with one level;
             or a metric such as lw.metrics.ITAE("depth").
         error: requested root mean square error from sampling and bias together, in the unit of the statistic; above 0.
-        relative_error: requested error as a fraction of the statistic, instead of `error`.
+        relative_error: requested error divided by the statistic's value; instead of `error`.
         t1: end time [s]. Default: run.duration of the scene.
         risk: for a quantity or a metric: "mean" (the default), a quantile's level, such as 0.95, or lw.metrics.CVaR(0.05).
         cheaper: scenes that cost less and behave similarly, as tables of changed numbers, such as {"controller.delay":
-            0.0}, or as Scenes. They serve only as coarse levels. Default none.
-        method: fixes the method. Default: the scene's own, and one that suits its terms.
-        h: fixes the step [s], and its bias is reported; the method is the scene's unless `method` is given.
-        dtype: fixes the precision, also of coarse levels. Default: the scene's, and "float32" for some coarse levels.
-        estimator: fixes the estimator: "plain Monte Carlo", "sobol", "regression", "levels" or "levels of sobol".
+            0.0}, or as Scenes. They are used only for the coarse levels. Default none.
+        method: method of the estimate. Default: the scene's method and one that suits its terms are tried.
+        h: step of the estimate [s]; its bias is reported. If `method` is not given, the scene's method is used.
+        dtype: precision of all levels. Default: the scene's, and "float32" for some coarse levels.
+        estimator: the estimator to use: "plain Monte Carlo", "sobol", "regression", "levels" or "levels of sobol".
             Default: the estimator with the lowest predicted cost.
-        recipe: `found.recipe` of an earlier answer: the same members are run again, without a pilot. Error, setting,
-            estimator and seed are taken from the recipe. Fleet, `of`, `risk` and `cheaper` must be the same as before.
+        recipe: `recipe` of an earlier answer: the same members run again, without a pilot. The recipe gives error,
+            setting, estimator and seed. Fleet, `of`, `risk` and `cheaper` must be the same as before.
         heavy_tail: True reports a mean even if its variance seems to be infinite. Default False: such a mean is refused.
         seed: seed of points and noise. Default: the ensemble's seed.
         threads: threads of the runs. Default: as in `lw.solve`.
-        executor: "threads" (default), "processes" or "dask", or an object that runs blocks. Costs are processor times
-            with threads, else wall times.
+        executor: "threads" (default), "processes" or "dask", or an object that runs blocks. Reported times are
+            processor times for "threads", otherwise wall times.
         scheduler: address of Dask's scheduler.
-        store: folder for the results of runs: the same call continues from there after an interruption, with the same
-            answer. A folder with results for other arguments is refused. Default: none.
+        store: folder for the results of runs. After an interruption, the same call continues from these results and
+            gives the same answer. A folder with results for other arguments is refused. Default: none.
         progress: True shows a bar or lines, as in lw.solve; a function is called with the completed fraction, from 0 to 1.
 
     Returns:
         The value, its interval and its cost; `print` shows a report.
 
     Raises:
-        SceneError: if arguments are faulty, the statistic has another kind or no finite variance, members fail at the
-            finest setting, or the given estimator is not possible.
+        SceneError: if arguments are faulty, the statistic is of another kind or has no finite variance, members fail at
+            the finest setting, or `estimator` is not possible.
         OSError: if `store` cannot be written.
         KeyboardInterrupt: if Ctrl-C interrupts the call. The message reports the progress; there is no answer.
 

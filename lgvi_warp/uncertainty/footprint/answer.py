@@ -17,12 +17,12 @@ from lgvi_warp.uncertainty.footprint.density import MAIN, Polygon, enclosed
 
 @dataclass(frozen=True, eq=False)
 class Region:
-    """The smallest region that contains a share of the members, with the circle and the ellipse of the same share.
+    """Smallest region that contains a given share of the members, and a circle and an ellipse with the same share.
 
     Attributes:
-        share: Share of the members.
+        share: Share of the members, as a fraction.
         area: Area [m2]; NaN if all positions are at one point or on a line.
-        low, high: 95 % interval of the area [m2]; high is infinite if the members are too few to bound it.
+        low, high: 95 % interval of the area [m2]; high is infinite if there are too few members to bound the area.
         radius: Radius of the circle about the centre that contains the share [m].
         ellipse_area: Area of the ellipse that would contain the share if the positions were normally distributed [m2].
         polygons: Parts of the region. Each is a tuple of rings (k, 2), north and east [m]: the outline, then its holes.
@@ -48,12 +48,12 @@ class Region:
 
     @property
     def scattered(self) -> bool:
-        """True if the region has several parts and the circle is much too large."""
+        """True if the region has several parts and the circle is much larger than the region."""
         return len(self.polygons) > 1 and math.pi * self.radius**2 > WIDE * self.area
 
     @property
     def largest(self) -> tuple[np.ndarray, float]:
-        """Centroid (2,) of the outline of the largest part, and the radius about it that contains this part [m]."""
+        """Centroid (2,) of the region's largest part, and radius of the circle about it that contains this part [m]."""
         ring = max(self.polygons, key=lambda rings: enclosed([rings]))[0]
         away = ring - ring[0]
         parts = away[:-1, 1] * away[1:, 0] - away[1:, 1] * away[:-1, 0]
@@ -63,19 +63,19 @@ class Region:
 
 @dataclass(frozen=True, eq=False)
 class Footprint(Saved):
-    """Positions of the members on the map, made by `lw.studies.footprint`.
+    """Positions of the members on the map, and regions that contain shares of them; result of `lw.studies.footprint`.
 
     Attributes:
-        at: "end", the name of an event or outcome, such as "floor", or a time [s] as text.
-        members: Number of members that have such a position.
+        at: "end", the name of an event or outcome, such as "floor", or a time [s] as text: when members are located.
+        members: Number of members that have a position at this end or time.
         lacking: Number of members without such a position, by outcome, such as {"ok": 700, "non_finite": 3}.
-        centre: Mean of the positions (2,), north and east of the origin [m]. Up to 5 % of the members may be left out
-            because they are far away; a message counts them.
-        covariance: Covariance of the same members (2, 2) [m2].
-        regions: The regions of 50, 90, 95 and 99 %, if there are enough members for them.
-        growth: For an eighth, a quarter, half and all of the members: number, area of the 95 % region and interval [m2].
-        origin: Latitude and longitude of the axes' origin [deg]; None if the scene has none.
-        places: North and east of members (m, 2) [m], for figures; a subset if there are more than 1,000 members.
+        centre: Mean of the positions (2,), north and east of the origin [m]. Far outliers, up to 5 % of the members,
+            are left out; a message gives their number.
+        covariance: Covariance of the same positions (2, 2) [m2].
+        regions: The regions with shares of 50, 90, 95 and 99 %, if there are enough members for them.
+        growth: For an eighth, a quarter, half and all of the members: (number, area of the 95 % region, interval) [m2].
+        origin: Latitude and longitude of the axes' origin [deg]; None if the scene does not give them.
+        places: North and east of some members (m, 2) [m], for figures; at most 1,000, chosen at random.
         messages: Notes for the user.
         provenance: Scene, ensemble, settings, versions and machine of the run.
     """

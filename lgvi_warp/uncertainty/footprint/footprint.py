@@ -61,21 +61,21 @@ def run_answer(result: Result) -> str:
 def footprint(result: Result, at: str | float = "end") -> Footprint:
     """Find the smallest regions that contain given shares of the members' positions, and their areas.
 
-    The shares are 50, 90, 95 and 99 %. The regions are level sets of a kernel density, at the levels above which these
-    shares of new members would lie. So they may have several parts and holes. Members that failed or never reach the
-    event have no position; `lacking` of the answer counts them.
+    The shares are 50, 90, 95 and 99 %. A region is the set where a kernel density exceeds a level that this share of
+    new members would exceed, so it may have several parts and holes. Members that failed or never reach the event have
+    no position; `lacking` of the answer counts them.
 
     Args:
         result: A result with positions, in memory or in a store.
-        at: "end"; the name of an event or outcome, such as "floor", for the positions where it stopped members; or a
-            sample time [s].
+        at: "end", for final positions; the name of an event or outcome, such as "floor", for the positions of members
+            that ended with it; or a sample time [s].
 
     Returns:
         Regions, centre, covariance, and the answer in one sentence.
 
     Raises:
-        SceneError: Positions were not saved, no sample has this time, or no member has such a position.
-        MissingExtra: contourpy is not installed (extra: viz).
+        SceneError: If positions were not saved, no sample has this time, or no member has such a position.
+        MissingExtra: If contourpy is not installed (extra: viz).
 
     Examples:
         >>> import lgvi_warp as lw

@@ -28,44 +28,45 @@ ESTIMATORS = {
 
 @dataclass(frozen=True, eq=False)
 class RareEvent(Saved):
-    """The probability of a rare event, and members for which it happens.
+    """Probability of a rare event, and members for which the event happens (failing members).
 
     Attributes:
         event: text of the event.
         probability: probability of the event; with failed="event", members that fail count as the event.
-        interval: (lower, upper), 95 % interval by Student's t for the logarithm.
+        interval: (lower, upper), 95 % interval, by Student's t for the logarithm of the probability.
         relative_error: relative standard error of the probability.
         estimator: "importance", "subset", "plain" or "splitting".
         members: number of members run, by setting: "scene" and the entries of `cheaper`; with splitting, in whole runs.
-        failing: the members for which the event happens, a `Table` for lw.Ensemble(scene, sampling=found.failing); None
-            if only noise varies. With splitting a member may occur several times, with different noise.
-        normals: (m, d), the varied numbers of the failing members as standard normals, in the order of `moved`.
-        draws: (m, k), normals of the failing members' noise, for lw.prepare(..., draws="given"); k = 0 without noise
-            and with splitting.
-        weights: (m,), weights of the failing members, with the sum 1.
-        failed_share: fraction of the probability from members that failed, or have a number that is not finite.
-        likeliest: values by name of the likeliest failing member, which has the smallest distance from the middle.
-        likeliest_draws: (k,), standard normals of this member's noise.
-        distance: this member's distance from the middle, in standard deviations of all varied numbers.
-        moved: name -> mean of the failing members, in standard deviations from the middle.
-        noise_moved: term or sensor -> z-score of the failing members' draws: of their mean path or of their sum of squares.
-            For noise that does not matter it is roughly a standard normal number; from 4.5 on, it is significant.
-        runs: the runs of subset simulation: thresholds and limits of each level. With splitting, these are scores: the
-            expected limit at the end divided by its uncertainty; infinite if the event happened.
-        plain_members: number of members that plain Monte Carlo would need for this error.
+        failing: the m failing members, a `Table` for lw.Ensemble(scene, sampling=found.failing); None if only noise
+            varies. With splitting a member may occur several times, with different noise.
+        normals: (m, d), standard normal scores of the d varied numbers of the failing members, in the order of `moved`.
+        draws: (m, k), standard normals of the failing members' k draws of noise, for lw.prepare(..., draws="given"); k
+            = 0 without noise and with splitting.
+        weights: (m,), weights of the failing members; their sum is 1.
+        failed_share: fraction of the probability due to members that failed or have a number that is not finite.
+        likeliest: values by name of the likeliest failing member: the nearest to the middle (median) of all inputs.
+        likeliest_draws: (k,), standard normal draws of this member's noise.
+        distance: norm of this member's standard normals: its distance from the middle, in standard deviations.
+        moved: name -> mean of the number over failing members, in standard deviations from its middle.
+        noise_moved: term or sensor -> z-score of the failing members' draws: of their mean path or their sum of
+            squares, whichever is larger. For irrelevant noise it is about standard normal; from 4.5 on it is
+            significant.
+        runs: the runs of subset simulation, with thresholds and limits of each level. With splitting, both are scores:
+            the expected limit at the end divided by its uncertainty; infinite if the event happened.
+        plain_members: number of members that plain Monte Carlo would need for the same relative error.
         plain_seconds: time that these members would take at the speed of this call [s].
-        seconds: time of the runs of members [s].
+        seconds: time of all runs of members in this call [s].
         messages: notes for the user.
         provenance: scene, distributions, settings, versions and machine.
-        paths: with splitting, (times (k + 1,) [s], indices (k,)) of each failing member: between two successive times
-            it has the noise of this index, with the seed of the call, as in `run.states(final, indices=, seed=)`.
-        moved_size: name -> mean absolute value of the failing members, in standard deviations; for all members it is 0.80.
+        paths: with splitting, (times (j + 1,) [s], indices (j,)) of each failing member: between successive times it
+            has the noise of this index and of the call's seed, as in `run.states(final, indices=, seed=)`.
+        moved_size: name -> mean distance of failing members from the middle, in standard deviations; all members: 0.80.
         moved_spread: name -> standard deviation of the failing members divided by that of all members.
         moved_z: name -> z-score farthest from 0 of these three differences from all members; significant from 4.5 on.
-        by_condition: if the event is any of several conditions, text of a condition -> (probability, lower, upper) of this
-            condition alone, and of "any" and "all" of them, over the whole run; otherwise, or with a status, empty.
-        ancestors: (m,), ancestor of each failing member in the first level, or its run with splitting. Members with the
-            same ancestor are related.
+        by_condition: for an event of several conditions, text of each condition, and "any" and "all" -> (probability,
+            lower, upper) over the whole run; otherwise, or with a status, empty.
+        ancestors: (m,), first-level ancestor of each failing member, or its run with splitting. Members that share an
+            ancestor are dependent.
     """
 
     study: ClassVar[str] = "rare"

@@ -72,39 +72,39 @@ def rare_event(
 ) -> RareEvent:
     """Estimate the probability of a rare event, with its interval, and list failing members.
 
-    Chains of members move level by level towards the event (subset simulation), over the varied numbers and the draws
-    of noise, in four independent runs. Importance sampling about the failing members then gives the answer if it passes
-    its checks; otherwise more chains give it. Events more likely than 1e-3 are sampled directly.
+    Markov chains of members move level by level towards the event (subset simulation), over the varied numbers and the
+    draws of noise, in four independent runs. Importance sampling about the failing members then gives the answer if it
+    passes its checks. Otherwise more chains give it. Events more likely than 1e-3 are sampled directly.
 
     Args:
         fleet: A Scene or an Ensemble; its distributions in `vary` and its noise make the members differ.
-        limit: The event: a quantity, such as "max(depth) - 40.0", or a function of a Result, that is positive in the event;
-            conditions as in a sweep, {"peak depth": {"above": 12.0}}, any of which is the event; or an event's name.
+        limit: The event: a quantity, such as "max(depth) - 40.0", or a function of a Result, above 0 in the event;
+            conditions as in a sweep, {"peak depth": {"above": 12.0}}, any of which suffices; or an event's name.
         relative_error: Target relative standard error of the probability, 0.005 to 0.5; 0.1 by default.
-        by: "chains", the default, or "splitting", for a scene with noise and an event that can be followed in time: a
-            number at the end, its max or min over the path, "max_error depth", "iae depth", or an event of the scene.
+        by: "chains", the default, or "splitting", for a scene with noise and an event that develops over time: a
+            quantity at the end, its max or min over the path, "max_error depth", "iae depth", or an event of the scene.
         cheaper: Coarser settings that the first chains may use; the answer is always for the scene's own setting. Each
             is a table of changed numbers and run settings, [{"h": 0.1, "dtype": "float32", "controller.delay": 0.0}].
             None by default.
-        intervals: Splitting: maximum number of time intervals, 2 to 1,000; 50 by default. More intervals need fewer
-            members, but each costs a call. Intervals begin at samples and at ticks of a controller.
+        intervals: Maximum number of time intervals of splitting, 2 to 1,000; 50 by default. More intervals need fewer
+            members, but each interval costs a call. Intervals begin at samples and at ticks of a controller.
         failed: "event" (default): a failed member counts as the event, and is reported separately; "refuse" raises an
             error.
-        most: Approximate maximum number of members to run, without the pilot, at least 10,000; 1,000,000 by default.
+        most: Approximate maximum number of members to run, without the pilot; at least 10,000, by default 1,000,000.
         seed: Seed of all random draws; 0 by default.
-        store: Folder for the results of runs: the same call continues from there after an interruption, with the same
-            answer. Splitting repeats its pilot and continues after the last complete level. A folder with results for
-            other arguments is refused. None by default.
-        progress: True shows a bar or lines, as in lw.solve; a function is called with the estimated completed fraction of
-            the work. None, the default, shows it on a terminal if more than 10 s are expected; False: nothing is shown.
+        store: Folder for the results of runs. After an interruption, the same call continues from these results and
+            gives the same answer. Splitting repeats its pilot and continues after the last complete level. A folder
+            with results for other arguments is refused. None by default.
+        progress: True shows a bar or lines, as in lw.solve; False: nothing; a function is called with the estimated
+            completed fraction. None, the default, shows progress on a terminal if more than 10 s are expected.
         **settings: As in `lw.prepare`: method, h, t1, save, dtype, threads, ...
 
     Returns:
         The probability, its interval, its cost, and the members for which the event happens.
 
     Raises:
-        SceneError: If an argument is at fault, the event never or always happens, the limit takes too few values to
-            show how near a member is to the event, or members have more draws of noise than chains can store.
+        SceneError: If an argument is wrong, the event never or always happens, the limit has too few different values
+            to show how near a member is to the event, or members have more draws of noise than chains can store.
         FailedMembers: With failed="refuse", if members failed.
         OSError: If `store` cannot be written.
 

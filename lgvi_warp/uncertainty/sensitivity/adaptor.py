@@ -22,27 +22,27 @@ from lgvi_warp.uncertainty.sensitivity.outputs import known_arguments
 
 
 class ScalarModel:
-    """A scene as a function of its varied numbers, for SALib, scipy and other libraries; made by `model`.
+    """Scene as a function of its varied numbers, for SALib, scipy and other libraries; the result of `model`.
 
     Args:
         scene: the scene.
         vary: name -> distribution, or only names.
         of: one or several quantities of interest, as in `sobol`.
         levels: True if X contains levels in (0, 1) instead of values.
-        failed: "refuse" raises an error if members fail; "nan" returns NaN for them.
+        failed: "refuse" raises an error if members fail; "nan" returns NaN for these members.
         settings: further arguments of `lw.prepare`.
 
     Attributes:
-        names: names of the columns of X (d,), in the order of `vary`.
+        names: names of the d columns of X (d,), in the order of `vary`.
         scene, vary, of, levels, failed: the arguments.
         problem: description of the columns for SALib.
 
     Methods:
         distributions: distribution of each column, for scipy.
-        scipy: run members in scipy's shape.
+        scipy: run members with arrays in scipy's shape.
 
     Raises:
-        SceneError: for faulty arguments, all in one message.
+        SceneError: for faulty arguments; one message lists all faults.
     """
 
     def __init__(self, scene: Scene, vary: Any, of: Any, levels: bool, failed: str, settings: Mapping[str, Any]):
@@ -67,10 +67,10 @@ class ScalarModel:
     def problem(self) -> dict[str, Any]:
         """Description of the columns for SALib.sample: num_vars, names, bounds, and dists or groups.
 
-        With levels it describes the unit cube; otherwise the distributions, all of which SALib must have.
+        With levels=True it describes the unit cube. Otherwise it describes the distributions, which SALib must support.
 
         Raises:
-            SceneError: if SALib does not have a distribution, or if `vary` has only names.
+            SceneError: if SALib does not support a distribution, or if `vary` has only names.
         """
         if self.levels:
             cube = salib_problem(self._fleet.space)
@@ -114,15 +114,15 @@ class ScalarModel:
         return np.asarray(self._prepared(X, seed=seed, indices=indices, progress=self._progress))
 
     def scipy(self, X: Any, *, seed: int | None = None, indices: Any = None) -> np.ndarray:
-        """Run members like a call, with arrays in scipy's shape.
+        """Run n members, like a call of this object, with arrays in scipy's shape.
 
         Args:
-            X: (d, n), with rows in the order of `names`; or by name, in any order.
-            seed: as in a call.
-            indices: as in a call.
+            X: values (d, n), with one row for each of `names`, in this order; or values by name, in any order.
+            seed: seed of the noise; None, the default: the seed is fixed.
+            indices: (n,), index of the member whose noise each column of X gets; None, the default: 0 to n - 1.
 
         Returns:
-            Y (n,), or (m, n) for several numbers.
+            Y (n,), or (m, n) for m quantities.
 
         Raises:
             SceneError: if labels are missing, unknown or duplicate, or if an entry is not a real number.
@@ -205,24 +205,25 @@ def model(
     failed: str = "refuse",
     **settings: Any,
 ) -> ScalarModel:
-    """Turn a scene into a function of its varied numbers; each row has fixed noise, unless a call gives `seed` or `indices`.
+    """Turn a scene into a function f of its varied numbers, for sensitivity analysis by other libraries.
 
-    f(X) takes X (n, d) and returns Y (n,) or (n, m), for SALib; f.scipy(X) takes X (d, n), for scipy's sobol_indices.
+    f(X) takes X (n, d): n members, d numbers. It returns Y (n,), or (n, m) for m quantities, as SALib needs. f.scipy(X)
+    takes X (d, n). Row i of X has the noise of member i, unless a call gives `seed` or `indices`.
 
     Args:
         scene: the scene.
-        vary: name -> distribution, or only names. The columns are the entries in `names`, in this order.
+        vary: name -> distribution, or only names. `names` of the function lists the columns of X, in the same order.
         of: one or several quantities of interest, as in `sobol`.
         levels: True if X contains levels in (0, 1), which the distributions turn into values; joint distributions need
-            this. Default False: X contains values.
-        failed: "refuse" raises an error if members fail, "nan" returns NaN for them. Default "refuse".
+            levels=True. Default False: X contains values.
+        failed: "refuse" raises an error if members fail; "nan" returns NaN for these members. Default "refuse".
         settings: further arguments of `lw.prepare` (method, h, t1, save, dtype, threads, common_noise), and `progress`.
 
     Returns:
         The function; X may also be a data frame, a mapping, a structured array or an xarray Dataset with columns by name.
 
     Raises:
-        SceneError: if arguments are faulty; one message lists all.
+        SceneError: if arguments are faulty; one message lists all faults.
         TypeError: for an argument that does not exist.
 
     Examples:

@@ -48,30 +48,30 @@ def sobol(
 ) -> SobolIndices:
     """Estimate Sobol indices of quantities of interest, by Saltelli's design and estimators.
 
-    The factors vary independently; a joint distribution counts as one factor. It uses independently scrambled Sobol
-    sequences, whose spread gives the intervals. Source: Saltelli et al. (2010), Computer Physics Communications 181.
+    Factors are inputs that vary independently; a joint distribution is one factor. The spread of R independently
+    scrambled Sobol sequences gives the intervals. Saltelli et al. (2010), Computer Physics Communications 181.
 
     Args:
         scene: a Scene, with distributions in its [ensemble] or in `vary`; or an Ensemble, for its scene, vary and seed.
-        of: "position[2]" or "depth" (at the end), "max(energy)" (over the path), "outcome floor", a lw.statistics.Quantity, a
-            function of a Result to (n,) or (n, m), or several of these.
-        samples: N, a multiple of `replicates`, best a power of two; N (2 d + 2) members are run for d factors, N (d + 2)
-            without second_order. Default 1024.
+        of: one or several quantities of interest: "position[2]", "depth" (at the end), "max(energy)" (over the path),
+            "outcome floor", a lw.statistics.Quantity, or a function of a Result to (n,) or (n, m), n members.
+        samples: number N of groups, a multiple of `replicates`, best a power of two. For d factors, N (2 d + 2) members
+            are run; without second_order, N (d + 2). Default 1024.
         vary: name -> distribution. Default: the scene's or the ensemble's distributions.
         seed: seed of the design. Default: the scene's or the ensemble's seed.
         second_order: True also estimates second-order indices of pairs. Default True.
-        replicates: number R of sequences, a power of two up to 64; with 1 there are no intervals. More sequences make
+        replicates: number R of sequences, a power of two up to 64; R = 1 gives no intervals. More sequences make
             intervals more reliable and estimates slightly less accurate. Default 8.
-        groups: name -> names that form one factor together: {"start": ["start.position", "start.velocity"]}. Default none.
+        groups: name -> names that form one factor: {"start": ["start.position", "start.velocity"]}. Default none.
         confidence: level of the intervals, between 0 and 1, by Student's t over the replicates. Default 0.95.
-        failed: "refuse" raises an error if members fail, "drop" uses the groups without a failed member. Default "refuse".
+        failed: "refuse" raises an error if members fail; "drop" omits groups with a failed member. Default "refuse".
         settings: arguments of `lw.solve` (method, h, t1, save, dtype, threads, progress) and of `evaluate`.
 
     Returns:
         First-order and total indices of every factor, in the order of `vary`, and second-order indices of pairs.
 
     Raises:
-        SceneError: if arguments are faulty; one message lists all.
+        SceneError: if arguments are faulty; one message lists all faults.
         TypeError: for an argument that does not exist.
         FailedMembers: if members failed and the indices cannot be computed from the others.
 
@@ -103,8 +103,8 @@ def sobol_of(fleet: Ensemble, outputs: Outputs, *, confidence: float = 0.95, fai
     """Estimate Sobol indices from existing outputs.
 
     Args:
-        fleet: the ensemble that was run, with Saltelli's design.
-        outputs: quantities of interest of its members.
+        fleet: the ensemble that was run; its sampling is lw.designs.Saltelli.
+        outputs: quantities of interest of its members, from `lw.uq.evaluate`.
         confidence: level of the intervals, between 0 and 1. Default 0.95.
         failed: "refuse" or "drop", as in `sobol`. Default "refuse".
 
@@ -175,20 +175,20 @@ def morris(
     Args:
         scene: a Scene, with distributions in its [ensemble] or in `vary`; or an Ensemble, for its scene, vary and seed.
         of: one or several quantities of interest, as in `sobol`.
-        samples: number of paths; samples (d + 1) members are run for d factors. Default 64.
-        levels: number of levels of the paths' grid, even; a step moves a factor by half the grid. Default 4.
+        samples: number N of paths; N (d + 1) members are run for d factors. Default 64.
+        levels: number of levels of each factor, even. A step of a path moves one factor by half the levels. Default 4.
         vary: name -> distribution. Default: the scene's or the ensemble's distributions.
         seed: seed of the design. Default: the scene's or the ensemble's seed.
         confidence: level of the bootstrap's intervals, between 0 and 1. Default 0.95.
         resamples: number of the bootstrap's resamples. Default 100.
-        failed: "refuse" raises an error if members fail, "drop" uses the paths without a failed member. Default "refuse".
+        failed: "refuse" raises an error if members fail; "drop" omits paths with a failed member. Default "refuse".
         settings: arguments of `lw.solve` (method, h, t1, save, dtype, threads, progress) and of `evaluate`.
 
     Returns:
         Elementary effects of every factor.
 
     Raises:
-        SceneError: if arguments are faulty; one message lists all.
+        SceneError: if arguments are faulty; one message lists all faults.
         FailedMembers: if members failed and the effects cannot be computed from the others.
 
     Examples:
@@ -212,8 +212,8 @@ def morris_of(
     """Compute elementary effects from existing outputs.
 
     Args:
-        fleet: the ensemble that was run, with Morris' design.
-        outputs: quantities of interest of its members.
+        fleet: the ensemble that was run; its sampling is lw.designs.Morris.
+        outputs: quantities of interest of its members, from `lw.uq.evaluate`.
         confidence: level of the bootstrap's intervals, between 0 and 1. Default 0.95.
         resamples: number of the bootstrap's resamples. Default 100.
         failed: "refuse" or "drop", as in `morris`. Default "refuse".
@@ -223,7 +223,7 @@ def morris_of(
 
     Raises:
         FailedMembers: if members failed and the effects cannot be computed from the others.
-        ImportError: without SALib.
+        ImportError: if SALib is not installed.
     """
     analyze = salib()
     design, space = _design_of(fleet, outputs, Morris), fleet.space

@@ -28,15 +28,15 @@ MOST_COMPARED = 200
 
 @dataclass(frozen=True, eq=False)
 class GivenDataIndices(Indices):
-    """First-order indices from given data: the fraction of each quantity's variance that one input explains alone.
+    """First-order indices from given data: fractions of the variance of m quantities that each of d inputs explains.
 
     Attributes:
-        first: the fraction (m, d) [1]; the estimate may be slightly below 0.
+        first: fraction of the variance explained by the input alone (m, d) [1]; may be estimated slightly below 0.
         first_confidence: distance from `first` to the farther end of its interval (m, d).
         lower: lower end of the interval (m, d).
         upper: upper end of the interval (m, d).
-        p: p-value, the probability that chance alone gives an index of at least this size (m, d).
-        slope: coefficient of the linear regression of standardised numbers (m, d); its sign is the direction of the effect.
+        p: p-value: probability that chance alone gives an index of at least this size (m, d).
+        slope: standardised linear regression coefficient (m, d). Its sign gives the direction of the effect.
     """
 
     first: np.ndarray
@@ -54,18 +54,18 @@ class GivenDataIndices(Indices):
 def given_data(
     result: Result | str | os.PathLike[str], of: OfInterest | Sequence[OfInterest], *, confidence: float = 0.95
 ) -> GivenDataIndices:
-    """Estimate first-order indices of a finished run for every number that varied in it, including those of the start.
+    """Estimate first-order indices from a finished run, for every number that varied in it, also at the start.
 
-    No design is needed. The members are divided into bins of each input. The index is the fraction of the variance
-    between the bins' means, minus the fraction expected by chance. The interval follows from the noncentral F
-    distribution, and is wider if the numbers are not normal. Interactions are not detected (see `lw.uq.sobol`). Inputs
+    No special design is needed. For each input, the members are divided into bins. The index is the fraction of the
+    variance between the bins' means, minus the fraction expected by chance. The interval follows from the noncentral F
+    distribution, and is wider if the quantity is not normal. Interactions are not detected (see `lw.uq.sobol`). Inputs
     should be independent: the common effect of correlated inputs counts for each of them.
 
     Args:
         result: A result of `lw.solve`, `lw.open_run` or `lw.Result.load`, or the path of a store.
         of: One or several quantities of interest, as in `lw.uq.sobol`: "depth" (at the end), "max(depth)", "outcome floor",
             "end_time floor", "depth at 30", a Quantity, a function of a Result or of (samples, members).
-        confidence: Level of the intervals; default 0.95.
+        confidence: Level of the intervals; by default 0.95.
 
     Returns:
         The indices: factors are the numbers that varied, such as "vehicle.mass" and "start.position[2]".

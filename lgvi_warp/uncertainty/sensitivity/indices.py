@@ -26,10 +26,10 @@ class Indices(Saved):
         quantities: labels of the quantities of interest (m,).
         mean: mean of the quantities over the design (m,) [their units].
         std: standard deviation of the quantities over the design (m,) [their units].
-        samples: number of groups or paths of the design that were used.
+        samples: number of groups or paths of the design, or of members of given data, that were used.
         members: number of members that were run.
         failed: number of members that failed.
-        confidence: level of the intervals; fields named ..._confidence hold their half widths.
+        confidence: level of the intervals; fields named ..._confidence hold the half widths of intervals.
         messages: notes for the user.
         provenance: scene, settings, versions and machine of the runs.
     """
@@ -171,16 +171,16 @@ def _places(content: dict[str, Any]) -> dict[str, dict[str, int]]:
 
 @dataclass(frozen=True, eq=False)
 class SobolIndices(Indices):
-    """Sobol indices: fractions of the variance of each quantity.
+    """Sobol indices: fractions of the variance of each of m quantities that d factors cause.
 
-    All indices of a quantity that does not vary are NaN, and a message reports it.
+    If a quantity does not vary, all its indices are NaN, and a message reports this.
 
     Attributes:
         first: fraction due to each factor alone (m, d) [1].
         first_confidence: half width of the interval of `first` (m, d).
         total: fraction due to each factor with all its interactions (m, d) [1].
         total_confidence: half width of the interval of `total` (m, d).
-        second: fraction due to the interaction of two factors (m, d, d) [1]; symmetric, with NaN on the diagonal; or None.
+        second: fraction due to each interaction of two factors (m, d, d) [1]; symmetric, NaN on the diagonal; or None.
         second_confidence: half width of the interval of `second` (m, d, d), or None.
     """
 
@@ -240,9 +240,9 @@ class SobolIndices(Indices):
 
 @dataclass(frozen=True, eq=False)
 class MorrisEffects(Indices):
-    """Elementary effects on each quantity, scaled to the whole range of a factor (side of the unit cube).
+    """Elementary effects of d factors on m quantities, per whole range of the factor (side of the unit cube).
 
-    mu and sigma of a factor with several numbers, such as an attitude, are NaN: a step moves all of its numbers.
+    mu and sigma of a factor with several numbers, such as an attitude, are NaN, since a step moves all of its numbers.
 
     Attributes:
         mu_star: mean absolute effect (m, d) [the quantity's unit].

@@ -189,7 +189,14 @@ def iterate(y: Any, p: Any, channels: int, six: int, demand: int, busy: Any):
     b = demand + 6
     L = demand + wp.static(VECTORS)
     lines = L + wp.static(MATRICES)
-    orthogonalise(y, p, channels, six, L, lines, zero)
+    loose = zero
+    for k in range(p.count):
+        loose = greatest(loose, positive(busy, unity - absolute(remembered(y, p.work + k)), zero))
+    if any_positive(loose):
+        orthogonalise(y, p, channels, six, L, lines, zero)
+    else:
+        clear(y, L, L + 36, zero)
+        clear(y, lines, lines + 6 * p.count, zero)
     noise = zero
     for i in range(six):
         r = remembered(y, demand + i)

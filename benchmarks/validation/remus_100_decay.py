@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Free decay in roll and pitch of a REMUS 100 at rest: comparison with another program, and with the period of small swings."""
+"""Free decay in roll and pitch of a REMUS 100 at rest, beside another program and the period of small swings."""
 
 from typing import Any
 

@@ -49,17 +49,24 @@ def copied(width, real):
 
 def less_products(width, real):
     """C++ of a number less products of rows from `a` and from `b` on: a loop of Warp takes longer than its product."""
-    row, load = f"((wp::vec_t<{width}, S>*)rows.data + (wp::int64)entry * rows.shape[1])", "memcpy(&{}, row + {} + i, sizeof(V));"
-    loop = f"for (wp::int64 i = 0; i < count; ++i) {{ V A, B; {load.format('A', 'a')} {load.format('B', 'b')} T -= A * B; }}"
-    begin = f"{head(width, real, '')} V T; memcpy(&T, &total, sizeof(V)); const auto* row = {row};"
-    return f"{begin} {loop} wp::vec_t<{width}, S> r; memcpy(&r, &T, sizeof(V)); return r;"
+    loop = f"for (wp::int64 i = 0; i < count; ++i) {{ V A, B; {_read('A', 'a')} {_read('B', 'b')} T -= A * B; }}"
+    begin = f"{head(width, real, '')} V T; memcpy(&T, &total, sizeof(V)); {_rows(width)} {loop}"
+    return f"{begin} wp::vec_t<{width}, S> r; memcpy(&r, &T, sizeof(V)); return r;"
 
 
 def less_rows(width, real):
     """C++ that takes f times rows from `source` on from those from `target` on."""
-    row, load = f"((wp::vec_t<{width}, S>*)rows.data + (wp::int64)entry * rows.shape[1])", "memcpy(&{}, row + {} + i, sizeof(V));"
-    change = f"V A, B; {load.format('A', 'target')} {load.format('B', 'source')} A -= F * B; memcpy(row + target + i, &A, sizeof(V));"
-    return f"{head(width, real, 'F')} auto* row = {row}; for (wp::int64 i = 0; i < count; ++i) {{ {change} }}"
+    change = f"{_read('A', 'target')} {_read('B', 'source')} A -= F * B; memcpy(row + target + i, &A, sizeof(V));"
+    loop = f"for (wp::int64 i = 0; i < count; ++i) {{ V A, B; {change} }}"
+    return f"{head(width, real, 'F')} {_rows(width)} {loop}"
+
+
+def _rows(width):
+    return f"auto* row = (wp::vec_t<{width}, S>*)rows.data + (wp::int64)entry * rows.shape[1];"
+
+
+def _read(name, place):
+    return f"memcpy(&{name}, row + {place} + i, sizeof(V));"
 
 
 def shared(width, real):

@@ -113,7 +113,9 @@ def factor(y: Any, p: Any, outputs: int, sides: int, L: int, zero: Any):
     size = wp.static(OF_SIDE)
     hard = hard_sides(p)
     for i in range(k):
-        advance(y, L + entry(k, i, i), unity, remembered(y, weights + size * i) + remembered(y, weights + size * (k + i)))
+        advance(
+            y, L + entry(k, i, i), unity, remembered(y, weights + size * i) + remembered(y, weights + size * (k + i))
+        )
         if p.rated > 0:
             up = weights + size * (2 * k + i)
             change = remembered(y, up) + remembered(y, up + size * k)

@@ -371,6 +371,27 @@ def test_the_times_of_a_schedule_in_steps_have_no_derivative():
         lw.solve(scene, "psi_x", h=0.1, t1=0.3, tangents=["wrench_schedule.times[1]"])
 
 
+def test_thrusters_at_their_limits_against_differences():
+    """Bounded least squares sums products over rows of the memory, which have a rule of their own for dual lanes."""
+    controller = lw.Controller(
+        period=0.1,
+        guidance=[lw.control.SetPoint(position=[0.0] * 3, heading=0.0)],
+        laws=[lw.control.StateFeedback(K=-np.eye(12)[[0, 1, 2, 9, 10, 11]])],
+        allocation=[lw.control.BoundedLeastSquares(to="thrusters")],
+    )
+
+    def command(x, **more):
+        scene = lw.Scene.named("bluerov2_heavy", controller=controller, start={"position": [x, 30.0, 20.0]})
+        return lw.solve(scene, "rk4", h=0.1, t1=0.1, save=lw.SaveAt(every=0.1, fields=("command",)), **more)
+
+    found = command(90.0, tangents=["start.position[0]"]).jacobian["command"][0, 0]
+    shift = 1e-4
+    ahead, behind = (command(90.0 + side * shift).command[0, 0] for side in (1.0, -1.0))
+    assert np.count_nonzero(np.abs(ahead) > 0.97) == 2
+    # Differences of commands are good to their round-off over the shift.
+    np.testing.assert_allclose(np.ravel(found), (ahead - behind) / (2.0 * shift), atol=1e-9)
+
+
 @pytest.mark.slow
 def test_one_name_may_stand_alone():
     result = lw.solve(falling(), "rk8", h=0.02, t1=0.1, tangents=" start.velocity[ 0 ] ", threads=1)

@@ -195,6 +195,22 @@ def _declare_pieces(kind):
         return wp.min(count, (rows.last - wp.clamp(first, rows.first, rows.last) + 1 - head) // each)
 
 
+def declare_loops(rows_type, L):  # noqa: N803
+    """Declare the functions of rows as loops of Warp: for guarded rows, and for lanes whose products have a rule of their own."""
+
+    @overloads.func
+    def rows_less_products(rows: rows_type, entry: int, a: int, b: int, count: int, total: L):
+        for i in range(count):
+            total = total - element(rows, entry, a, i) * element(rows, entry, b, i)
+        return total
+
+    @overloads.func
+    def rows_less_rows(rows: rows_type, entry: int, target: int, f: L, source: int, count: int):
+        for i in range(count):
+            value = element(rows, entry, target, i) - f * element(rows, entry, source, i)
+            set_element(rows, entry, target, i, value)
+
+
 @overloads.for_each_type
 def _declare_rows(width, real):
     L, I = lane(width, real), int_lane(width)  # noqa: E741
@@ -238,17 +254,7 @@ def _declare_rows(width, real):
     @overloads.func_native(native.own(width, real, write))
     def set_element(rows: OwnLanes, entry: int, row: int, offset: int, value: L): ...
 
-    @overloads.func
-    def rows_less_products(rows: OwnLanes, entry: int, a: int, b: int, count: int, total: L):
-        for i in range(count):
-            total = total - element(rows, entry, a, i) * element(rows, entry, b, i)
-        return total
-
-    @overloads.func
-    def rows_less_rows(rows: OwnLanes, entry: int, target: int, f: L, source: int, count: int):
-        for i in range(count):
-            value = element(rows, entry, target, i) - f * element(rows, entry, source, i)
-            set_element(rows, entry, target, i, value)
+    declare_loops(OwnLanes, L)
 
     @overloads.func_native(native.gather_any(width, real, False))
     def gathered(like: L, rows: Rows, entry: int, row: int, offset: int, index: I) -> L: ...

@@ -15,6 +15,7 @@ from lgvi_kernels.lanes.arithmetic import (  # noqa: F401  (families, to which o
     add,
     any_positive,
     below,
+    declare_loops,
     div,
     int_lane,
     lane,
@@ -92,6 +93,8 @@ def _declare_operators(shape, code):
 
     @overloads.func_native(code["ones"])
     def ones(like: L) -> L: ...
+
+    declare_loops(wp.array2d(dtype=L), L)
 
 
 def _declare_choices(shape, code):

@@ -459,7 +459,7 @@ def control(w: Any, r: Any, y: Any, p: Any):
     slope_of = free + 2 * n * k
     cost = slope_of + 2 * n * k
     # Scratch: errors, demand; state and disturbance; the last inputs as parts of their limits; the best inputs; inputs, f,
-    # slope and step of iterations, and m zeros; the constraints; the factor.
+    # slope and step of iterations, and m zeros; the constraints; the factor, behind which three rows are read.
     demand = p.work + wp.static(SEEN)
     x = demand + wp.static(DEMAND)
     before = x + 2 * n
@@ -469,7 +469,6 @@ def control(w: Any, r: Any, y: Any, p: Any):
     none = f + 3 * k
     sides = none + m
     L = sides + wp.static(OF_EACH) * (k + p.rated * k)
-    p.memory + 1
     unity = ones(w.force.x)
     zero = unity - unity
     look(r, y, p, limits, x, before, zero)

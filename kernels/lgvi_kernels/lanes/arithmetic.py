@@ -196,7 +196,7 @@ def _declare_pieces(kind):
 
 
 def declare_loops(rows_type, L):  # noqa: N803
-    """Declare the functions of rows as loops of Warp: for guarded rows, and for lanes whose products have a rule of their own."""
+    """Declare the functions of rows as loops of Warp: for guarded rows, and for lanes whose products have own rules."""
 
     @overloads.func
     def rows_less_products(rows: rows_type, entry: int, a: int, b: int, count: int, total: L):

@@ -42,7 +42,7 @@ class Waypoints(Guidance):
     Args:
         points: Waypoints, (k, 3) [m], inertial axes: at least two; neighbours must differ in north or east.
         geodetic: Waypoints as latitude, longitude [deg, WGS 84] and depth [m], (k, 3), in place of `points`. The scene's
-            environment must have an origin. Legs are straight in the plane of the inertial axes. Points that are given so
+            environment must have an origin. Legs are straight in the plane of the inertial axes. Geodetic points
             cannot vary by member.
         speed: Wanted forward speed through the water [m/s]; with `times`, the largest wanted speed.
         look_ahead: Look-ahead distance D [m].

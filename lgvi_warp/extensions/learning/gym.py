@@ -42,7 +42,7 @@ class Vehicles:
     An action is a demand or the commands of an actuator, held until the next tick. An observation holds measured values,
     including sensor errors, and wanted values. A vehicle that fails, or that an event of the scene stops, is terminated.
     Each episode of each environment is a different member of the ensemble, with its own draws of all varied numbers. The
-    scene's control laws stay active, and the actions are added to their demands.
+    scene's control laws stay active: actions that are demands are added to the demands of the laws.
 
     `observe`, `reward` and `terminated` may be functions of (t, y, r): the time since the environments began [s], the measured
     and the wanted values (`lw.control.CallbackInput`) of m vehicles at once.

@@ -71,7 +71,7 @@ class Sensor(MeasuringPart):
         outlier: Probability that a reading is an outlier; by default there are no outliers.
         outlier_std: Standard deviation of the error that an outlier adds to the reading.
         deepest: Depth of the sensor below which readings are lost [m], as for GPS; inf by default.
-        place: Position of a sensor of position or depth on the body, such as an antenna, (3,) [m], body axes; by default the
+        place: Point of the body at which a sensor of position or depth is mounted, (3,) [m], body axes; by default the
             body's origin. The sensor reads the position or depth of this point.
         reads: Kind of depth reading. "geometry", the default, is the distance from the mean surface. "pressure" is the
             reading p / (rho g) of a pressure cell below the scene's tide. It includes the pressure of waves by linear theory,

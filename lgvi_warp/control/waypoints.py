@@ -56,8 +56,8 @@ class Waypoints(Guidance):
         times: Arrival time at each point, (k,) [s], rising. Before the first time the wanted speed is 0. By default there are
             no times.
         loiter_radius: Radius [m] of circles about points.
-        loiter_turns: Number of turns about each point, (k,), 0 at the first; by default no turns.
-        loiter_time: Least time on the circle about each point, (k,) [s], 0 at the first; by default no time.
+        loiter_turns: Number of turns about each point, (k,), 0 at the first point; by default no turns.
+        loiter_time: Least time on the circle about each point, (k,) [s], 0 at the first point; by default no time.
         clockwise: Whether the vehicle circles clockwise as seen from above; by default True.
 
     Raises:

@@ -64,7 +64,7 @@ class Vehicle(Summarized):
             body's mass matrix. 6x6 form.
         inertia_tolerance: Allowed violation of the triangle inequality of the principal inertias, as a fraction of the
             largest one, in the 6x6 form. With 0, the default, a matrix that no rigid body can have is refused; importers set
-            it for published numbers.
+            the tolerance for published numbers.
         warnings: Texts about unusual but allowed numbers, such as those of importers. The vehicle adds its own warnings; a
             run shows all of them in its messages.
         shape: Drawn shape of the vehicle, a table with `length` and `diameter` [m] or with `mesh`, the path of a .glb file; by

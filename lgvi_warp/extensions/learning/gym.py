@@ -52,8 +52,8 @@ class Vehicles:
         observe: Names of numbers, as listed in docs/controllers/gym.md and including the inputs of `lw.control.Policy`; or a
             function that returns (m, k).
         act: "demand", the default: actions are added to the laws' demands. "command": actions are the commands of the only
-            term that takes commands. With the key of a term, actions are the commands of this term. Such actions replace the
-            commands that the laws would give.
+            term that takes commands. With the key of a term, actions are the commands of this term. Such commands replace
+            the commands that the laws would give.
         reward: Function that returns rewards (m,), with the actions (m, n) as an optional fourth argument; by default 0.
         terminated: Function that returns truth values (m,), True for each episode to end; None by default.
         duration: Length of an episode [s], after which it is truncated. By default the duration of the scene's [run]; without

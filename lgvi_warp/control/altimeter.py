@@ -33,7 +33,7 @@ class Altimeter(Sensor):
         quantum: Readings are rounded to whole multiples of this length [m]; 0 by default, for no rounding.
         every: Number of ticks from one new reading to the next, a whole number; 1 by default.
         latency: Number of ticks after which a reading arrives, a whole number; 0 by default.
-        dropout: Probability that a reading is lost, so that the last reading is kept; 0 by default.
+        dropout: Probability that a reading is lost, in which case the last reading is kept; 0 by default.
         burst: Mean number of ticks in a row without a reading; by default losses are independent.
         outlier: Probability that a reading is an outlier; by default there are no outliers.
         outlier_std: Standard deviation of the error that an outlier adds to the reading [m].

@@ -26,7 +26,7 @@ class Altitude(Guidance):
 
     With an altimeter, the floor's depth is the depth of the point that the beam hits. It is computed from the measured
     depth, the measured attitude and the reading. With a beam that points ahead, the vehicle climbs before a slope. Without
-    an echo the vehicle goes deeper until the beam has an echo. With the chart, the floor's depth is the smaller of
+    an echo the vehicle goes deeper until the beam has an echo. With `source="chart"`, the floor's depth is the smaller of
     the depths of the scene's floor at the measured position and at the distance `look_ahead` ahead.
 
     Args:

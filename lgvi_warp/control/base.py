@@ -478,7 +478,7 @@ class IntegralLaw(ControlLaw):
 
     Args:
         anti_windup: "conditional", the default, stops an integrator while the actuators do not deliver the whole demand
-            and the integrator's error would increase the missing part. "none" never stops an integrator.
+            and further integration would increase the undelivered part. "none" never stops an integrator.
     """
 
     # Rows of the memory, two of each integral's number; and what the device code calls several limits of integrals.
@@ -513,7 +513,7 @@ class PoseLaw(IntegralLaw):
 
     Args:
         feedforward: "restoring" balances weight, buoyancy and their moment at the measured attitude. It uses the scene's
-            numbers for every member, since a controller does not know a member's own; or "none", the default.
+            nominal numbers for every member. "none", the default, adds nothing.
     """
 
     needs: ClassVar[tuple[str, ...]] = ("position", "velocity", "attitude", "angular_velocity")

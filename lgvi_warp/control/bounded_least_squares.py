@@ -22,10 +22,10 @@ WORK = 138
 class BoundedLeastSquares(EffortAllocation):
     """Allocation by bounded least squares: efforts within limits with the least error (Johansen & Fossen 2013, 2.2).
 
-    The error is the sum over X, ..., N of (priority times (wrench minus demand))^2, with moments divided by the mean lever
-    arm of the channels. If the efforts of least error without limits are within the limits, they are used. They equal the
-    efforts of `PseudoInverse` if the channels can produce every component independently. Otherwise an active-set method
-    finds the efforts of least error, to round-off. Channels that are known to be lost get no effort, however many these are.
+    The error is the sum over X, Y, Z, K, M, N of (priority times (wrench minus demand))^2, with moments divided by the mean
+    lever arm of the channels. If the efforts of least error without limits are within the limits, they are used. They equal
+    the efforts of `PseudoInverse` if the channels can produce every component independently. Otherwise an active-set method
+    finds the efforts of least error, to round-off. Channels that are known to be lost get no effort, whatever their number.
 
     Args:
         to: Key of the term that takes the commands.

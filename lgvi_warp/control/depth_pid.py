@@ -28,9 +28,9 @@ class DepthPID(IntegralLaw):
         kd_pitch: Gain of the pitch rate q [N m s/rad]; 0 by default.
         k_heave: Gain of the heave velocity w [N s]; 0 by default.
         integral_limit: Largest sizes of I and of I_theta, (2,) [m s, rad s]; 1e6 by default.
-        anti_windup: "conditional", the default, stops an integrator while the actuators do not deliver the whole demand
-            and the integrator's error would increase the missing part, and the depth's integrator also while the
-            wanted pitch is at its limit. "none" never stops an integrator.
+        anti_windup: "conditional", the default, stops I_theta while the actuators do not deliver the whole moment M and
+            further integration would increase the undelivered part. It stops I while the wanted pitch is at its limit
+            and further integration would move it further beyond. "none" never stops an integrator.
 
     Examples:
         >>> import lgvi_warp as lw

@@ -24,7 +24,7 @@ class Docking(Guidance):
     dJ/dt = D e / (D^2 + (e + kappa J)^2). The wanted heading is the dock's heading minus atan((e + kappa J) / D). The wanted
     speed over ground falls linearly with the distance, from `speed` at the distance `slowing` to `contact_speed` at the
     dock. The funnel's radius is `mouth` at the dock and grows by tan(`funnel`) per metre of distance. A vehicle that is
-    nearer than `judged` and outside the funnel starts again. It goes to the point that is `approach`
+    nearer to the dock than `judged` and outside the funnel starts again. It goes to the point at the distance `approach`
     before the dock and `offset` to starboard of the line, and from there along the line. A vehicle that reaches the dock's
     plane inside the mouth is docked. Its wanted speed is then 0, and its wanted position and heading are the dock's.
 

@@ -50,11 +50,11 @@ class Fault(Sending):
     | freeze | the last command or reading repeats |
     | slow | x follows with a first-order lag, starting from the last command or reading |
     | delay | x arrives later; until the first delayed x arrives, the last command or reading repeats |
-    | intermittent | on at times: then a command changes as with "gain", a reading repeats, an estimator gets no reading |
+    | intermittent | while on, a command changes as with "gain", the last reading repeats, an estimator gets no reading |
 
     The fault begins at the first tick at or after `time` and ends at the first tick at or after `until`. A sensor's fault
     acts directly after the sensor, on the reading that has arrived. If an estimator takes the readings, the fault acts on
-    the readings that it takes, and a fault with memory remembers only new readings. Laws are not informed of a fault, and
+    these; the kinds "stuck", "freeze", "slow" and "delay" store only new readings. Laws are not informed of a fault, and
     their integrals continue.
 
     Args:

@@ -22,7 +22,7 @@ class HeadingPID(IntegralLaw):
         kd: Gain of the yaw rate [N m s/rad]; 0 by default.
         integral_limit: Largest size of I [rad s]; 1e6 by default.
         anti_windup: "conditional", the default, stops an integrator while the actuators do not deliver the whole demand
-            and the integrator's error would increase the missing part. "none" never stops an integrator.
+            and further integration would increase the undelivered part. "none" never stops an integrator.
 
     Examples:
         >>> import lgvi_warp as lw

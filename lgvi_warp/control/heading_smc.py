@@ -15,9 +15,9 @@ class HeadingSMC(IntegralLaw):
     """Integral sliding mode control of the heading, with Nomoto's model as feedforward (Fossen 2021, eq. 16.479).
 
     Let psi be the heading, r its rate, psi_d and r_d their wanted values, and I the integral of psi - psi_d. Then
-    sigma = (r - r_d) + 2 lambda (psi - psi_d) + lambda^2 I, r_v = r - sigma, and a_v is the rate of r_v at the present
-    errors. The demand is N = (nomoto_time a_v + r_v - k_d sigma - k_sigma sat(sigma / boundary)) / nomoto_gain, where sat(x)
-    is x limited to [-1, 1].
+    sigma = (r - r_d) + 2 lambda (psi - psi_d) + lambda^2 I, r_v = r - sigma, and
+    a_v = dr_d/dt - 2 lambda (r - r_d) - lambda^2 (psi - psi_d). The demand, with sat(x) for x limited to [-1, 1], is
+    N = (nomoto_time a_v + r_v - k_d sigma - k_sigma sat(sigma / boundary)) / nomoto_gain.
 
     Args:
         lambda_: Rate at which errors decay while sigma is 0 [1/s]; its name is `lambda` in a scene file.
@@ -28,7 +28,7 @@ class HeadingSMC(IntegralLaw):
         nomoto_time: T of Nomoto's model [s]; 0 by default.
         integral_limit: Largest size of I [rad s]; 1e6 by default.
         anti_windup: "conditional", the default, stops an integrator while the actuators do not deliver the whole demand
-            and the integrator's error would increase the missing part. "none" never stops an integrator.
+            and further integration would increase the undelivered part. "none" never stops an integrator.
     """
 
     type: ClassVar[str] = "heading_smc"

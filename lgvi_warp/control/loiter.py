@@ -20,7 +20,7 @@ class Loiter(Guidance):
     Let d be the horizontal distance from the centre. The wanted heading is the direction of the circle's tangent, turned
     towards the circle by atan((d - radius) / look_ahead). The wanted heading rate on the circle is speed / radius. For
     laws that control the pose (`PosePID`, `PoseSMC`), the wanted position and velocity are those of the point of the circle
-    that is abeam of the vehicle. A vehicle that cannot turn so tightly follows a wider circle.
+    that is abeam of the vehicle. If the vehicle cannot turn at this radius, it follows a wider circle.
 
     Args:
         center: Centre of the circle, (3,) [m], inertial axes; its third number is the depth.

@@ -15,8 +15,8 @@ from lgvi_warp.physics.terms.base import number
 class LowPass(MeasuringPart):
     """First-order low-pass filter of one measured quantity, exact for readings that are held over a period.
 
-    At each tick the output x <- x + (1 - exp(-T / time_constant)) (measured - x), where T is the period. It starts at the
-    first reading. A difference of headings is taken within half a turn. An attitude turns by the same fraction of the
+    At each tick x <- x + (1 - exp(-T / time_constant)) (measured - x), where x is the output and T the period. x starts at
+    the first reading. A difference of headings is taken within half a turn. An attitude turns by the same fraction of the
     rotation to the measured attitude.
 
     Args:

@@ -51,7 +51,7 @@ PLACES = {name: (place, wish) for place, (name, wish) in enumerate(_places())}
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Policy(ControlLaw):
-    """A trained multilayer perceptron: each layer replaces y by f(W y + b); the demand is `scale` times the last output.
+    """A trained multilayer perceptron: each layer maps its input y to f(W y + b). The demand is `scale` times the output.
 
     The file holds W and b of each layer: weights_0 (n1, n0), biases_0 (n1,), weights_1 (n2, n1), ... as np.savez writes
     them, uncompressed. n0 is the number of inputs. Nothing in the file is executed.

@@ -31,7 +31,7 @@ class PoseSMC(PoseLaw):
         feedforward: "restoring" balances weight, buoyancy and their moment at the measured attitude. It uses the scene's
             nominal numbers for every member. "none", the default, adds nothing.
         anti_windup: "conditional", the default, stops an integrator while the actuators do not deliver the whole demand
-            and the integrator's error would increase the missing part. The position's integrator stops for each body
+            and further integration would increase the undelivered part. The position's integrator stops for each body
             axis separately, since actuators act along body axes. "none" never stops an integrator.
     """
 

@@ -22,11 +22,11 @@ TERMS = 13
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ReferenceModel(Guidance):
-    """Smooth path from the measured state to the values that preceding guidance wants (Fossen 2021, 12.1.1).
+    """Smooth path from the measured state to the values that the guidance before this part sets (Fossen 2021, 12.1.1).
 
-    Each coordinate x follows its target s, x''' + (2 zeta + 1) omega x'' + (2 zeta + 1) omega^2 x' + omega^3 (x - s) = 0.
+    Each coordinate x follows its target s: x''' + (2 zeta + 1) omega x'' + (2 zeta + 1) omega^2 x' + omega^3 (x - s) = 0.
     The path starts at the measured position, heading and rates. Between ticks the target is held and the equation is solved
-    exactly. If x' then exceeds its limit, x moves at the limit over the whole period, and x'' is 0. A heading turns the
+    exactly. If x' would then exceed its limit, x moves at the limit over the whole period, and x'' is 0. A heading turns the
     short way to its target and may pass pi. Wanted roll and pitch are not changed.
 
     Args:

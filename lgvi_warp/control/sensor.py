@@ -65,13 +65,13 @@ class Sensor(MeasuringPart):
         quantum: Readings are rounded to whole multiples of this number; 0 by default, for no rounding.
         every: Number of ticks from one new reading to the next; 1 by default. In between, the last reading is kept.
         latency: Number of ticks after which a reading arrives; 0 by default. Until then the first reading is used.
-        dropout: Probability that a reading is lost, so that the last reading is kept; 0 by default.
+        dropout: Probability that a reading is lost, in which case the last reading is kept; 0 by default.
         burst: Mean length of a run of lost readings [ticks], at least 1 and at least dropout / (1 - dropout). By default, or
             at 0, losses are independent. The fraction of lost readings stays `dropout` (Gilbert 1960, a chain of two states).
         outlier: Probability that a reading is an outlier; by default there are no outliers.
         outlier_std: Standard deviation of the error that an outlier adds to the reading.
         deepest: Depth of the sensor below which readings are lost [m], as for GPS; inf by default.
-        place: Position of a sensor of position or depth on the body, such as an antenna, (3,) [m], body axes; by default the
+        place: Point of the body at which a sensor of position or depth is mounted, (3,) [m], body axes; by default the
             body's origin. The sensor reads the position or depth of this point.
         reads: Kind of depth reading. "geometry", the default, is the distance from the mean surface. "pressure" is the
             reading p / (rho g) of a pressure cell below the scene's tide. It includes the pressure of waves by linear theory,

@@ -23,7 +23,7 @@ class SpeedPID(IntegralLaw):
         drag: Feedforward coefficient, drag divided by the square of the speed [N s^2/m^2]; 0 by default.
         integral_limit: Largest size of I [m]; 1e6 by default.
         anti_windup: "conditional", the default, stops an integrator while the actuators do not deliver the whole demand
-            and the integrator's error would increase the missing part. "none" never stops an integrator.
+            and further integration would increase the undelivered part. "none" never stops an integrator.
     """
 
     type: ClassVar[str] = "speed_pid"

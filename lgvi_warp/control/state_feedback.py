@@ -12,7 +12,7 @@ from lgvi_warp.physics.terms.base import number
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class StateFeedback(ControlLaw):
-    """Linear state feedback: the demand w = -K x of the error x (12,), as of a linear quadratic regulator.
+    """Linear state feedback, such as a linear quadratic regulator: the demand is w = -K x, where x (12,) is the error.
 
     x = (b - b_d, e_R, nu - R^T v_d, Omega - R^T R_d Omega_d), measured minus wanted values: position in inertial axes [m],
     attitude as in `PosePID` [1], velocity over ground [m/s] and angular velocity [rad/s] in body axes. The index d marks

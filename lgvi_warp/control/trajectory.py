@@ -28,7 +28,7 @@ class Trajectory(Guidance):
     Args:
         times: Times (k,) [s], rising, at least two.
         positions: Wanted positions (k, 3) [m], inertial axes.
-        headings: Wanted headings (k,) [rad]; the heading turns the short way from each to the next. By default no heading is
+        headings: Wanted headings (k,) [rad]; it turns the short way to the next heading. By default no heading is
             wanted.
         speed: Wanted forward speeds through the water (k,) [m/s]; by default the size of the wanted velocity. Between times
             they are interpolated linearly, or held with "steps".

@@ -42,7 +42,7 @@ class Waypoints(Guidance):
     Args:
         points: Waypoints, (k, 3) [m], inertial axes: at least two; neighbours must differ in north or east.
         geodetic: Waypoints as latitude, longitude [deg, WGS 84] and depth [m], (k, 3), in place of `points`. The scene's
-            environment must have an origin. Legs are straight in the plane of the inertial axes. Points that are given so
+            environment must have an origin. Legs are straight in the plane of the inertial axes. Geodetic points
             cannot vary by member.
         speed: Wanted forward speed through the water [m/s]; with `times`, the largest wanted speed.
         look_ahead: Look-ahead distance D [m].
@@ -56,8 +56,8 @@ class Waypoints(Guidance):
         times: Arrival time at each point, (k,) [s], rising. Before the first time the wanted speed is 0. By default there are
             no times.
         loiter_radius: Radius [m] of circles about points.
-        loiter_turns: Number of turns about each point, (k,), 0 at the first; by default no turns.
-        loiter_time: Least time on the circle about each point, (k,) [s], 0 at the first; by default no time.
+        loiter_turns: Number of turns about each point, (k,), 0 at the first point; by default no turns.
+        loiter_time: Least time on the circle about each point, (k,) [s], 0 at the first point; by default no time.
         clockwise: Whether the vehicle circles clockwise as seen from above; by default True.
 
     Raises:

@@ -39,7 +39,7 @@ class NoiseDraws:
         spacing: Time from one draw to the next [s].
         count: Number of draws.
         size: Count of numbers of a draw, 3 for axes x, y, z, or 1.
-        column: First column of these draws in xi. Columns are ordered by draw, then by axis.
+        column: First column of these draws in the array xi of all draws. Columns are ordered by draw, then by axis.
         source: The stream of the counters that would otherwise give these numbers.
     """
 
@@ -59,7 +59,7 @@ class NoiseDraws:
 
     @property
     def columns(self) -> slice:
-        """Columns of these draws in xi."""
+        """Columns of these draws in the array xi of all draws."""
         return slice(self.column, self.column + self.numbers)
 
     @property
@@ -119,7 +119,7 @@ class DrawLayout:
         return self._by_key[key]
 
     def owner(self, column: int) -> str:
-        """The owner of a column of xi.
+        """The owner of a column of the array xi of all draws.
 
         Args:
             column: Index of the column.

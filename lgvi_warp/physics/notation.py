@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Conversions between the user's notation (Fossen's) and the paper's: momenta, principal axes, attitudes.
+"""Conversions between the user's notation (Fossen's) and Nordkvist & Sanyal's: momenta, principal axes, attitudes.
 
 velocity = nu, angular_velocity = Om, position = b, attitude = R (body to inertial); p = M nu, pi = J Om.
 Every function accepts any leading dimensions; a leading dimension of 1 is broadcast.
@@ -162,27 +162,27 @@ def rotations(R: np.ndarray, limit: float = ORTHOGONAL) -> np.ndarray:
 
 
 def rotate_into(Q: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    """Components of vectors in other axes, Q^T v.
+    """Components of vectors along other axes, Q^T v.
 
     Args:
-        Q: Rotation from the other axes to the user's, (..., 3, 3).
+        Q: Rotation matrix from the other axes to the user's axes, (..., 3, 3).
         vectors: Vectors (..., 3) in the user's axes.
 
     Returns:
-        Vectors (..., 3) in the axes Q.
+        The same vectors (..., 3) in the other axes.
     """
     return np.matmul(np.swapaxes(Q, -1, -2), vectors[..., None])[..., 0]
 
 
 def rotate_out(Q: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    """Components of body vectors in the user's axes, Q v; the inverse of `rotate_into`.
+    """Components of vectors along the user's axes, Q v; the inverse of `rotate_into`.
 
     Args:
-        Q: Rotation from the other axes to the user's, (..., 3, 3).
-        vectors: Vectors (..., 3) in the axes Q.
+        Q: Rotation matrix from the other axes to the user's axes, (..., 3, 3).
+        vectors: Vectors (..., 3) in the other axes.
 
     Returns:
-        Vectors (..., 3) in the user's axes.
+        The same vectors (..., 3) in the user's axes.
     """
     return np.matmul(Q, vectors[..., None])[..., 0]
 

@@ -46,9 +46,9 @@ def _are_texts(value: Any) -> bool:
 class Vehicle(Summarized):
     """A rigid body in water, in body axes (x ahead, y to starboard, z down), described in one of two forms.
 
-    The simple form is about the centre of gravity: `mass`, `inertia`, `added_mass`. The 6x6 form is about any origin of the
-    body: `rigid_body_mass_matrix`, `added_mass_matrix`, `weight`, `center_of_gravity`. A diagonal (3,) is stored as a full
-    matrix. All arguments but `mass` are keyword-only, so that inertia and added mass are not confused.
+    The simple form has `mass`, `inertia` and `added_mass`, about the centre of gravity. The 6x6 form, about any origin of
+    the body, has `rigid_body_mass_matrix`, `added_mass_matrix`, `weight` and `center_of_gravity`. A diagonal (3,) is stored
+    as a full matrix. All arguments but `mass` are keyword-only, so that inertia and added mass are not confused.
 
     Args:
         mass: Dry mass [kg]. Simple form.
@@ -60,16 +60,16 @@ class Vehicle(Summarized):
         added_mass_matrix: Added mass, (6, 6) [kg, kg m, kg m2], positive: minus Fossen's X_udot and so on; 0 by default.
             6x6 form.
         weight: Weight [N]; by default mass times gravity. 6x6 form.
-        center_of_gravity: Point at which the weight acts, (3,) [m] from the origin; by default that of the rigid body's mass
-            matrix. 6x6 form.
+        center_of_gravity: Point at which the weight acts, (3,) [m] from the origin; by default it follows from the rigid
+            body's mass matrix. 6x6 form.
         inertia_tolerance: Allowed violation of the triangle inequality of the principal inertias, as a fraction of the
             largest one, in the 6x6 form. With 0, the default, a matrix that no rigid body can have is refused; importers set
-            it for published numbers.
+            the tolerance for published numbers.
         warnings: Texts about unusual but allowed numbers, such as those of importers. The vehicle adds its own warnings; a
             run shows all of them in its messages.
         shape: Drawn shape of the vehicle, a table with `length` and `diameter` [m] or with `mesh`, the path of a .glb file; by
             default a hull of the displaced volume. It has no effect on the motion.
-        title: Name of the vehicle in summaries and reports; by default its name if it comes with the package.
+        title: Name of the vehicle in summaries and reports; by default the name in the package, if it has one.
 
     Raises:
         SceneError: If a number is not finite, not positive, of the wrong shape, not symmetric or not positive definite.

@@ -43,7 +43,7 @@ class Ensemble(Summarized, Documented):
 
     * every number that `scene.parameters()` lists: "vehicle.mass", "drag.quadratic" (a term's name or type, and its
       field), ...
-    * the numbers that the scene's start gives: "start.position", "start.angular_velocity", ..., and always
+    * the numbers that the user gave for the scene's start: "start.position", "start.angular_velocity", ..., and always
       "start.attitude";
     * one entry of such a vector or matrix: "start.position[2]";
     * several numbers that one distribution draws jointly: "vehicle.mass, vehicle.buoyancy".

@@ -189,8 +189,8 @@ def _moment(text: Any) -> np.datetime64 | None:
 class Start:
     """The state at t = 0.
 
-    Values that are not given are zero, and without an attitude the body has the inertial axes. Give at most one of `position`
-    and `geodetic`, one of the four attitudes, and one of the two velocities.
+    Values that are not given are zero; without an attitude, the body's axes are the inertial axes. Give at most one of
+    `position` and `geodetic`, at most one of the four forms of the attitude, and at most one of the two velocities.
 
     Args:
         position: Position of the body origin (3,) [m], inertial axes (north, east, down).

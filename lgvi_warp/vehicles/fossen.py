@@ -259,8 +259,8 @@ def from_fossen(
     It is enough to give one of a symmetric pair such as Y_rdot, N_vdot. These coefficients are refused:
 
     * X_qq and similar coefficients, whose force is even in the velocity and therefore is not drag;
-    * products (Y_uv, X_wq). Products of the added mass follow from its matrix. Products with u are a hull's lift: use the
-      term body_lift. The term quadratic_form accepts any product;
+    * products (Y_uv, X_wq). Products due to added mass (its Coriolis terms) follow from its matrix. Products
+      with u are a hull's lift: use the term body_lift. The term quadratic_form accepts any product;
     * second-order moduli such as Y_|v|r (Fossen 2021, nonlinear damping). They are cross-flow drag due to sway and yaw
       together, which a drag matrix cannot represent. The term cross_flow computes this drag along the hull.
 

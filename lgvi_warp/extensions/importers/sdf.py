@@ -55,7 +55,7 @@ def from_sdf(
     Args:
         source: Path of the file, or its text.
         model: Name of the model, if the file holds several.
-        link: Name of the main link; by default the link that the plugin names, or the first of the heaviest joined links.
+        link: Name of the main link; by default the plugin's link, or the heaviest root link of the heaviest joined group.
         world: Another SDF file (path or text) with a <world> that gives gravity and density for the model.
         buoyancy: Buoyancy [N], instead of the buoyancy of the shapes.
         volume: Displaced volume [m3], instead of the volume of the shapes.
@@ -69,7 +69,7 @@ def from_sdf(
         The tables "vehicle", "environment" and "terms" of a scene file. Without a shape the vehicle is neutral.
 
     Raises:
-        SceneError: If the file is invalid, such as a mass that is not a number, a mesh without `volume`, or a template. The
+        SceneError: If the file is invalid: a mass is not a number, a mesh has no `volume`, the file is a template, etc. The
             message lists every fault.
     """
     faults = Faults()

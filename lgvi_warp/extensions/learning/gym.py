@@ -42,7 +42,7 @@ class Vehicles:
     An action is a demand or the commands of an actuator, held until the next tick. An observation holds measured values,
     including sensor errors, and wanted values. A vehicle that fails, or that an event of the scene stops, is terminated.
     Each episode of each environment is a different member of the ensemble, with its own draws of all varied numbers. The
-    scene's control laws stay active, and the actions are added to their demands.
+    scene's control laws stay active: actions that are demands are added to the demands of the laws.
 
     `observe`, `reward` and `terminated` may be functions of (t, y, r): the time since the environments began [s], the measured
     and the wanted values (`lw.control.CallbackInput`) of m vehicles at once.
@@ -52,8 +52,8 @@ class Vehicles:
         observe: Names of numbers, as listed in docs/controllers/gym.md and including the inputs of `lw.control.Policy`; or a
             function that returns (m, k).
         act: "demand", the default: actions are added to the laws' demands. "command": actions are the commands of the only
-            term that takes commands. With the key of a term, actions are the commands of this term. Such actions replace the
-            commands that the laws would give.
+            term that takes commands. With the key of a term, actions are the commands of this term. Such commands replace
+            the commands that the laws would give.
         reward: Function that returns rewards (m,), with the actions (m, n) as an optional fourth argument; by default 0.
         terminated: Function that returns truth values (m,), True for each episode to end; None by default.
         duration: Length of an episode [s], after which it is truncated. By default the duration of the scene's [run]; without

@@ -141,7 +141,7 @@ class Baselines:
             indices: Indices of environments; None, the default, for all.
 
         Returns:
-            The value, once for each environment. Of an array with one row for each environment, the environment's row.
+            The value, once for each environment. An array with one row for each environment is divided into its rows.
         """
         return self._of_each(getattr(self.env, attr_name), indices)
 
@@ -172,7 +172,7 @@ class Baselines:
             method_kwargs: Keyword arguments of the call.
 
         Returns:
-            The answer, once for each environment. Of an array with one row for each environment, the environment's row.
+            The answer, once for each environment. An array with one row for each environment is divided into its rows.
         """
         return self._of_each(getattr(self.env, method_name)(*method_args, **method_kwargs), indices)
 

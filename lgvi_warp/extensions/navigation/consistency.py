@@ -18,13 +18,13 @@ NEEDED = ("nees", "nis", "nis_count")
 
 
 class TimeAverage(NamedTuple):
-    """Test of a mean over all members and times against that of a consistent filter.
+    """Test of a mean over all members and times against the mean that a consistent filter has.
 
     Attributes:
         mean: Mean over all members and times; NaN if there are no values.
-        degrees: Degrees of freedom of one value. A consistent filter has this mean.
+        degrees: Degrees of freedom of one value, equal to the mean that a consistent filter has.
         effective: Effective sample size, the number of independent values with the same information.
-        p: Two-sided p-value: probability of a mean at least as far off for a consistent filter; NaN without a mean.
+        p: Two-sided p-value: probability that a consistent filter has a mean at least as far off; NaN without a mean.
     """
 
     mean: float
@@ -130,7 +130,7 @@ def consistency(result: Any, level: float = 0.95) -> Consistency:
     Navigation*, section 5.4). Errors of one member at two times are not independent, so an ensemble may by chance be
     outside its NEES band for long. The fraction of the times in the band is therefore not a test; the mean over all times
     is tested instead. Its effective sample size is the number of values divided by 1 + 2 times the sum of their
-    autocorrelations. The sum of that many values of a consistent filter has a chi-square distribution.
+    autocorrelations. For a consistent filter, the sum of that many independent values has a chi-square distribution.
 
     Args:
         result: Result of a run with an `lw.control.ErrorStateFilter` that saved "nees", "nis" and "nis_count".

@@ -584,7 +584,7 @@ class Term(Documented):
         return None
 
     def water_at_start(self, numbers: Numbers, position: np.ndarray, context: PackingContext) -> np.ndarray:
-        """Velocity of the water at the members' start, or where they continue; by default that of `water` at that time.
+        """Velocity of the water where the members start or continue; by default the result of `water` at that time.
 
         Args:
             numbers: The term's numbers by field, each of shape (n, ...).
@@ -598,7 +598,7 @@ class Term(Documented):
         return np.zeros_like(position) if still is None else still[0]
 
     def braking(self, numbers: Numbers, speeds: Array, water_density: Array) -> Array:
-        """Damping matrix of the term at given speeds: minus the derivative of its wrench by the velocity, or a bound.
+        """Damping matrix of the term at given speeds: minus the derivative of its wrench by the velocity, or a bound on it.
 
         A run without a given method uses this matrix to choose a stable method (lgvi_warp.runs.default_method).
 

@@ -17,7 +17,7 @@ COMPONENTS = ("X", "Y", "Z", "K", "M", "N")
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ControlWrench(Term):
-    """An ideal actuator: a controller commands force and torque about the body's origin. They are 0 without a controller.
+    """An ideal actuator: a controller commands force and torque about the body's origin; without a controller they are 0.
 
     Each component n follows n' = (command - n) / time constant, with |n'| at most the rate limit and the command within the
     limit.

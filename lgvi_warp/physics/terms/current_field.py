@@ -31,7 +31,7 @@ class CurrentField(InFile, Term):
 
     Args:
         velocities: Velocities of the water [m/s], inertial axes, (x, y, z, 3) for x, y, z nodes along north, east and depth.
-            With `times`, t fields (t, x, y, z, 3). With s scenarios (s, t, x, y, z, 3), or (s, x, y, z, 3) without `times`.
+            With `times`: (t, x, y, z, 3) for t fields. For s scenarios: (s, t, x, y, z, 3), without `times` (s, x, y, z, 3).
         origin: Position of the first node, (3,) [m]: north, east, depth; zeros by default.
         spacing: Distance between nodes along north, east and depth, (3,) [m].
         times: Time of the first field and time step between fields, (2,) [s]; None, the default, for a constant field.

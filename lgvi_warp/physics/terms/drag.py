@@ -28,7 +28,7 @@ PARTS = {
 class Drag(Term):
     """Drag along and about each body axis: force = -(linear + quadratic |v|) v, torque likewise (Fossen 2021, section 8.1).
 
-    v is the velocity along the axis, relative to the water and at the user's origin; for the torque, the angular velocity.
+    v is the velocity of the user's origin along the axis, relative to the water; for the torque, v is the angular velocity.
 
     Args:
         linear: Linear coefficients, (6,) [N s/m, N m s], at least 0; 0 by default.

@@ -32,10 +32,10 @@ class Floor(InFile, Event):
     used. `edges` returns an event that stops members at the edges.
 
     Args:
-        depth: Depth of the floor [m]; or a grid of depths, (x, y) [m], at the nodes along north and east.
+        depth: Depth of the floor [m]; or an array of depths of shape (nodes along north, nodes along east) [m].
         origin: Position of the grid's first node, (2,) [m]: north and east; zeros by default.
         spacing: Distance between nodes along north and east, (2,) [m]; required with a grid.
-        clearance: Height above the floor at which members stop [m]; 0 if omitted. Give a number to let it vary by member.
+        clearance: Height above the floor at which members stop [m]; 0 if omitted. To vary it by member, give a value here.
         contact: "stop", the default; or "rest", so that members land on the floor by a term `lw.terms.BottomContact`.
 
     Methods:

@@ -17,9 +17,9 @@ class HullLoads(StripTerm):
     """Loads on a slender hull in water that moves differently along it, as in waves (Lighthill 1960; Newman 1977, 7.4).
 
     The loads are computed by strips. The vehicle's added mass and the water velocity at its origin give the loads in water
-    that is uniform along the hull. This term adds the differences at each station: the pressure of the undisturbed water,
-    the momentum of the water that the strip sets in motion, and cross-flow drag with the local flow. The term includes the
-    drag of `CrossFlow`: use only one of the two terms.
+    that is uniform along the hull. At each station, this term adds the differences due to the local water motion in the
+    pressure of the undisturbed water and in the momentum of the water that the strip sets in motion. It also adds cross-flow
+    drag with the local flow, which includes the drag of `CrossFlow`: use only one of the two terms.
 
     Args:
         stations: Positions along the body's x axis, (k,) [m], rising; two or more, from stern to bow.

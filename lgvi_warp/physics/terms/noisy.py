@@ -54,9 +54,9 @@ class NoisyTerm(Term):
     and device code that has its own `params` must declare it.
 
     Args:
-        noise_step: Time from one draw to the next [s]. The step of a run must be a whole multiple of it; all such runs have
-            the same noise path. None, the default, draws once a step, so that runs with different steps have different
-            paths.
+        noise_step: Time from one draw to the next [s]. The step of a run must be a whole multiple of `noise_step`; then
+            runs with different steps have the same noise path. None, the default, draws once a step, so that runs with
+            different steps have different paths.
 
     Methods:
         draws: Number of draws in one step of a run.

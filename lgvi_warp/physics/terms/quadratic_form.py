@@ -168,8 +168,8 @@ class QuadraticForm(Term):
             rho: Density of the water [kg/m3].
             length: Reference length L of the dimensionless coefficients [m].
             added_mass: The vehicle's added mass, (6, 6) [kg, kg m, kg m2]. Published coefficients include its effect (X'wq,
-                Y'wp, ...), which the vehicle's equations already contain. If given, this effect is subtracted. By default
-                nothing is subtracted.
+                Y'wp, ...), which the vehicle's equations already contain. If the added mass is given, this effect is
+                subtracted. By default nothing is subtracted.
             ignore: Names to leave out; by default none.
             name: Name of the term; by default its type.
 

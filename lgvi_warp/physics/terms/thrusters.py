@@ -69,7 +69,7 @@ class Thrusters(Commanded):
             By default `table_commands`.
         power: Electrical power at these commands, (s, n) [W], or (s,) for n equal thrusters, linear between the commands and
             constant outside. None by default, for no power (see `EnergyUse`).
-        shaft_speed: Angular speed of the propeller per unit of w, (n,) [rad/s per unit], instead of a table. The power is then
+        shaft_speed: Angular speed of the propeller per unit of w, (n,) [rad/s per unit], instead of `power`. Power is then
             torque times shaft speed, divided by the efficiency. None by default.
         efficiency: Mechanical power of the shaft divided by electrical power, (n,); 1 by default.
         dead_band: Size of the command below which there is no thrust, (n,) [unit]; 0 by default.

@@ -235,7 +235,7 @@ class WaveTerm(Term):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Waves(WaveTerm, Harmonics):
-    """A sum of linear waves with angular frequencies in the water of sqrt(g k tanh(k depth)); g: gravity, k: wave number.
+    """Linear waves whose angular frequencies in the water are sqrt(g k tanh(k depth)); g: gravity, k: wavenumber.
 
     Args:
         amplitudes: Amplitudes of the surface, (k,) [m].

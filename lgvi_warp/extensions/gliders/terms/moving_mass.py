@@ -63,8 +63,8 @@ class MovingMass(Term):
 
     Raises:
         SceneError: If times do not rise or are missing, a direction has length 0, limits or time constants are given
-            without channels, or a number is invalid (see `Term`). A scene refuses the mass if its vehicle cannot include
-            the mass at the reference position.
+            without channels, or a number is invalid (see `Term`). A scene refuses the mass if the rest of its
+            vehicle, without the mass at the reference position, would have no positive inertia.
 
     Examples:
         >>> import lgvi_warp as lw

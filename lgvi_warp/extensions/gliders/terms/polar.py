@@ -19,8 +19,8 @@ class Polar(Term):
 
     (u, v, w) is the velocity of the body's origin through the water, V its size, a = atan2(w, u), b = asin(v / V), and
     (p, q, r) is the angular velocity. In flow axes, the drag is (K_D0 + K_D a^2) V^2, the side force K_b b V^2 and the lift
-    (K_L0 + K_L a) V^2. The moments are (K_MR b + K_p p) V^2, (K_M0 + K_M a + K_q q) V^2 and (K_MY b + K_r r) V^2.
-    Coefficients have their published signs and are 0 by default.
+    (K_L0 + K_L a) V^2. The roll, pitch and yaw moments are (K_MR b + K_p p) V^2, (K_M0 + K_M a + K_q q) V^2 and
+    (K_MY b + K_r r) V^2. Coefficients have their published signs and are 0 by default.
 
     Args:
         drag: K_D0 [kg/m].

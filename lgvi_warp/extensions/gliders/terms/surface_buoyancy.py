@@ -28,8 +28,8 @@ STRETCH = {"box": 1.0, "circle": 4.0 / 3.0}
 class SurfaceBuoyancy(Term):
     """Buoyancy that decreases as the hull comes out of the water. The surface is at depth 0 or at the scene's waves.
 
-    The vehicle's buoyancy is distributed over parts of the hull, about its centre of buoyancy. Each part loses the buoyancy
-    of its section above the surface; a submerged hull keeps its full buoyancy. In still water the force has a potential.
+    The vehicle's buoyancy is distributed over parts of the hull, centred at the centre of buoyancy. Each part loses the
+    buoyancy of its section above the surface; a submerged hull keeps all buoyancy. In still water the force has a potential.
 
     Args:
         heights: Height of the hull's sections, (k,) [m], linear between stations; one number for a hull of one part.

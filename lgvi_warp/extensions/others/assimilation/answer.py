@@ -28,12 +28,12 @@ class Assimilated(Summarized, Saved):
 
     Attributes:
         time: Times of the measurements (k,) [s].
-        mean: Means after the measurements, weighted with particles: position (k, 3) [m], velocity (k, 3) [m/s] and
+        mean: Means after the measurements (weighted for "particles"): position (k, 3) [m], velocity (k, 3) [m/s] and
             angular_velocity (k, 3) [rad/s] in body axes, attitude (k, 3, 3), and the learned numbers by name, (k, ...).
         std: Standard deviations of the same quantities; those of the attitude are (k, 3) [rad], about the body's axes.
         innovations: {series: measured minus predicted values (k, m)}; NaN if a series has no value at a time.
-        innovation_std: Expected standard deviations of the innovations, (k, m): square root of the predictions' variance plus
-            the instrument's variance.
+        innovation_std: Expected standard deviations of the innovations, (k, m): square root of the sum
+            of the predictions' variance and the instrument's variance.
         whitened: {series: innovations multiplied by the inverse square root of their covariance (k, m)}.
         left_out: {series: whether the gate left its values out at each time (k,)}.
         log_likelihood: Logarithm of the probability density of all measured values, each given the values before it, without

@@ -74,7 +74,7 @@ def assimilate(
     The filter updates learned numbers in the normal scores of their distribution, z = Phi^-1(F(x)) (Bertino, Evensen &
     Wackernagel 2003). Every updated value is therefore a possible value of the distribution: a log-normal number stays
     positive, and a uniform number within its bounds. Numbers that were given to the members as arrays have no distribution.
-    The filter updates their values, or their logarithms if the scene refuses the opposite sign.
+    The filter updates their values, or the logarithms of their sizes if all have one sign and the scene refuses the other.
 
     Args:
         fleet: An Ensemble, or a Scene with its [ensemble], of tens to thousands of members.

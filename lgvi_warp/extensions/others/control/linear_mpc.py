@@ -59,13 +59,13 @@ class LinearMPC(ControlLaw):
     The model is x' = A x + B u + d from tick to tick. At each tick the inputs of the next `horizon` periods minimise the
     sum of (x - x_s)^T Q (x - x_s) + (u - u_s)^T R (u - u_s), plus (x - x_s)^T P (x - x_s) at the end. The inputs satisfy
     |u| <= `limit`, and their rates are at most `rate_limit`. The input of the first period is the demand; the next tick
-    solves a new problem. If the unconstrained optimum satisfies the limits, it is used, to round-off. Otherwise an
-    interior-point method (Nocedal & Wright 2006, algorithm 16.4) solves the constrained problem. Its demand is accurate to
-    1e-6 of the limit, in float32 to 1e-2. The run's messages report ticks at which the method had not converged.
+    repeats this with new measurements. If the unconstrained optimum satisfies the limits, it is used, to round-off.
+    Otherwise an interior-point method (Nocedal & Wright 2006, algorithm 16.4) solves the constrained problem. Its demand is
+    accurate to 1e-6 of the limit, in float32 to 1e-2. The run's messages report ticks at which the method had not converged.
 
     d is the estimated disturbance: the measured x minus its prediction, filtered over `disturbance_time`. For the prediction,
     the last reference is continued at its rates. x_s and u_s are the steady state under d in which the `tracked` errors are
-    0, so constant disturbances cause no error in these states. Undelivered demand does not count as an input.
+    0, so constant disturbances cause no error in these states. The prediction uses only the delivered demand.
     `lw.linear.mpc` creates the law from a linear model.
 
     Args:
@@ -81,8 +81,8 @@ class LinearMPC(ControlLaw):
         P: Weight of the state at the end of the horizon (n, n), symmetric; by default Q.
         rate_limit: Largest rates of the inputs (m,) [N/s, N m/s]; by default no limit.
         disturbance_time: Time constant of the disturbance filter [s]; with inf, no disturbance is estimated. 5 by default.
-        tracked: Names of the states whose steady errors are to be 0, at most as many as inputs; by default the first of
-            `states`, as many as inputs.
+        tracked: Names of the states whose steady errors are to be 0, at most m names; by default the first m of
+            `states`.
         lower: Least inputs (m,) [N, N m], below `limit`; by default -limit.
         outputs: Combinations C of the states (p, n) that have a limit, C x <= output_limit at each tick of the horizon; by
             default none. For a lower limit give -C.
@@ -91,13 +91,13 @@ class LinearMPC(ControlLaw):
             cost, a limit is exceeded only if no inputs can satisfy it.
         preview: Whether to use the future reference over the horizon, which requires that guidance has only set-points and
             trajectories; False by default: the reference continues at its present velocity.
-        horizon: Number of periods, 1 to 100, over which the model grows by a factor of at most 1e4; 10 by default.
+        horizon: Number of periods, 1 to 100, over which the model may grow by a factor of at most 1e4; 10 by default.
         iterations: Largest number of iterations at a tick, 50 by default; most ticks need about ten.
         period: Period of the model [s]; a controller with another period is refused. By default any period is accepted.
 
     Raises:
-        SceneError: If names, shapes or weights are invalid, no inputs hold a steady state without tracked errors, or a number
-            is invalid (see `Term`).
+        SceneError: If names, shapes or weights are invalid, no inputs hold a steady state with zero tracked errors, or a
+            number is invalid (see `Term`).
 
     Examples:
         >>> import lgvi_warp as lw

@@ -48,7 +48,7 @@ def mpc(
         horizon: Number of periods, 1 to 100; 10 by default.
         iterations: Largest number of iterations at a tick; 50 by default.
         disturbance_time: Time constant of the disturbance filter [s]; with inf, no disturbance is estimated. 5 by default.
-        tracked: Names of the states whose steady errors are to be 0; by default the first, as many as inputs.
+        tracked: Names of the states whose steady errors are to be 0; by default the first m states.
         lower: Least inputs (m,) [N, N m]; by default -limit.
         outputs: Combinations of the states (p, n) that have a limit, C x <= output_limit; by default none.
         output_limit: Largest outputs (p,).

@@ -30,7 +30,7 @@ class BottomContact(Term):
 
     The floor pushes a point at the depth d below it with the force stiffness * d + damping * (speed into the floor), and
     never pulls. Along the floor, a spring and a damper hold the point with a force of at most friction times this push; if
-    more were needed, the point slides. A vehicle at rest stays at rest.
+    a larger force were needed, the point slides. A vehicle at rest stays at rest.
 
     The step h limits stiffness and damping. At these limits, the phase of the vehicle's fastest oscillation on all its
     points advances by 1 rad in a step, and its speed decays within one step. The limits are the defaults, so a shorter step
@@ -41,7 +41,7 @@ class BottomContact(Term):
         friction: Coefficient of friction, the tangent of the friction cone's angle; 0.5 by default.
         stiffness: Stiffness of the floor at each point [N/m]; by default the limit for the step.
         damping: Damping at each point [N s/m]; by default critical damping. The step sets an upper bound, and a lower bound
-            that lets no bounce gain energy.
+            below which a bounce could gain energy.
         floor: Name of the floor; "", the default, stands for the only floor whose `contact` is "rest".
 
     Raises:

@@ -24,7 +24,7 @@ WHY = "the largest tides are 8 m above their mean: is it in feet or cm?"
 class Tide(SurfaceLevel):
     """A tide, which moves the surface; the floor and the inertial axes stay in place.
 
-    The height of the surface above the depth 0 is mean + sum of amplitude cos(2 pi t / period + phase) + table at t. The
+    The height of the surface above the depth 0 is mean + sum of amplitude cos(2 pi t / period + phase) + table value. The
     tide shifts the surface of `surface_buoyancy`, waves, pressure cells and the event `surface`, and the depths at which a
     buoyancy engine reverses.
 

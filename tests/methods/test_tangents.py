@@ -392,6 +392,27 @@ def test_thrusters_at_their_limits_against_differences():
     np.testing.assert_allclose(np.ravel(found), (ahead - behind) / (2.0 * shift), atol=1e-9)
 
 
+def test_a_predictive_law_at_its_limits_against_differences():
+    """Its iterations divide a number by a lane, which Warp's own quotient did slope by slope."""
+    T, shift = 0.1, 1e-4
+    law = lw.control.LinearMPC(states=["position[2]", "velocity[2]"], inputs=["Z"], A=[[1.0, T], [0.0, 1.0]],
+                               B=[[T * T / 40.0], [T / 20.0]], Q=[1.0, 0.0], R=[1e-4], limit=[30.0], rate_limit=[60.0],
+                               horizon=3)  # fmt: skip
+    controller = lw.Controller(period=T, guidance=[lw.control.SetPoint(depth=3.0)], laws=[law],
+                               allocation=[lw.control.PseudoInverse(to="thrusters")])  # fmt: skip
+
+    def demand(z, **more):
+        scene = lw.Scene.named("bluerov2_heavy", controller=controller, start={"position": [0.0, 0.0, z]})
+        return lw.solve(scene, "rk4", h=T, t1=4 * T, save=lw.SaveAt(every=T, fields=("demand",)), **more)
+
+    found = demand(2.0, tangents=["start.position[2]"]).jacobian["demand"].reshape(5, 6)[:, 2]
+    ahead, behind = (demand(2.0 + side * shift).demand[:, 0, 2] for side in (1.0, -1.0))
+    # At the limit of the rate at first, then free; demands are good to 1e-8 of their limit.
+    assert np.all(np.abs(found[:2]) < 1e-6)
+    assert np.all(np.abs(found[2:]) > 1.0)
+    np.testing.assert_allclose(found, (ahead - behind) / (2.0 * shift), rtol=1e-4, atol=30.0 * 1e-8 / shift)
+
+
 @pytest.mark.slow
 def test_one_name_may_stand_alone():
     result = lw.solve(falling(), "rk8", h=0.02, t1=0.1, tangents=" start.velocity[ 0 ] ", threads=1)

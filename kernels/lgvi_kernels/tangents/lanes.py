@@ -88,6 +88,10 @@ def _declare_operators(shape, code):
     @overloads.func_native(code["div"])
     def div(a: L, b: L) -> L: ...
 
+    # Warp's own quotient of a number and a vector would divide by slopes as well.
+    @overloads.func_native(code["div of a number"])
+    def div(s: R, a: L) -> L: ...
+
     @overloads.func_native(code["fused"])
     def fused(a: L, b: L, c: L) -> L: ...
 

@@ -26,6 +26,7 @@ RULES = {
     "mul": ("AB", "A * B", "dA * B + A * dB"),
     "mul by a number": ("A", "s * A", "s * dA"),
     # One division, which takes as long as ten products, for the value and all slopes.
+    "div of a number": ("A", "s * Y", "-R * dA * Y", "V Y = (S)1 / A;"),
     "div": ("AB", "A * Y", "(dA - R * dB) * Y", "V Y = (S)1 / B;"),
     # At 0 it falls, as `positive` takes 0 for one of the others: a |a| and tanh a so have their slopes there.
     "absolute": ("A", "A < (S)0 ? -A : A", "A > (S)0 ? dA : -dA"),

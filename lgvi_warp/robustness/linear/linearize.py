@@ -33,8 +33,9 @@ INPUTS = ("commands", "wrench")
 class LinearModel:
     """Discrete linear model of deviations from a motion: x' = A x + B u, y = C x + D u.
 
-    x: n states; x': one period later; u: m inputs; y: the first 12 states: position [m, inertial axes], rotation vector
-    [rad], velocity [m/s], angular velocity [rad/s] (body axes). Memory of actuators and control parts follows.
+    x: n states; x': x one period later; u: m inputs; y: the first 12 states: position [m, inertial axes], rotation
+    vector [rad], velocity [m/s], angular velocity [rad/s] (body axes). The other states are memory of actuators and
+    parts.
 
     Attributes:
         A: state matrix (n, n).
@@ -91,7 +92,7 @@ class LinearModel:
             states=tuple(self.states[i] for i in keep), inputs=tuple(self.inputs[i] for i in push))  # fmt: skip
 
     def state_space(self) -> Any:
-        """Convert the model to a StateSpace of python-control (extra: control), for its margins, plots and designs.
+        """Convert the model to a StateSpace of python-control (extra: control), to compute margins and designs.
 
         Returns:
             A control.StateSpace with the names of this model's states, inputs and outputs; dots become underscores.
@@ -135,20 +136,20 @@ def linearize(
     """Linearise one period of the plant with constant commands, or of the closed loop.
 
     Central differences of the run's own steps give the model, so it includes the method, the lags of actuators and the
-    hold of commands. Its errors are step^2 times a third derivative, and round-off / step: about 1e-10. In a closed
-    loop, noise, drift and rounding of sensors are set to 0, their mean, and faults are off.
+    hold of commands. Its errors are step^2 times a third derivative plus round-off / step, together about 1e-10. In a
+    closed loop, noise, drift and rounding of sensors are set to 0, their mean, and faults are off.
 
     Args:
         scene: The scene, without waves and noise; or an Ensemble, whose scene is used.
         about: Motion to linearise about: a result of `lw.linear.trim`; or, in a closed loop, a time [s] of a run. None,
-            the default: the start with commands of 0; in a closed loop the motion after one period.
+            the default: for a plant, the start with commands of 0; for a closed loop, the motion after one period.
         inputs: "commands" of the actuators, the default; or, for a plant only, "wrench": X, Y, Z [N], K, M, N [N m] in
-            body axes about the body's origin, held for a period. The actuators then keep their commands.
+            body axes about the body's origin, held for a period; the actuators keep their commands.
         closed: True includes the controller in the model; the inputs are then added to its commands. Default False.
         period: Period of a plant [s]. Default: the controller's period; without a controller, the step.
         method: As in `lw.solve`. Default: the method of the trim; without a trim, the scene's method.
         h: Step [s]. Default: the step of the trim; without a trim, the scene's step.
-        step: Increment of the central differences; for numbers above 1 it is relative. Default 1e-5.
+        step: Increment of the central differences; above a size of 1, a fraction of the changed number. Default 1e-5.
 
     Returns:
         The model.

@@ -43,7 +43,7 @@ class OfCourse(Metric):
 
     The goal is constant: the set point of the scene at the first tick, before any reference model; with other guidance,
     the desired value at the first tick. d is the goal minus the actual value, and the step is d at the first tick.
-    "Below" and "beyond" refer to the direction of the step, which is upward if the step is 0.
+    "Below" and "beyond" refer to the direction of the step, which is positive if the step is 0.
 
     Args:
         of: "depth", "heading", "speed", "north" or "east". The goal is the set point, before any reference model; with
@@ -365,7 +365,8 @@ class ITAE(OverTime):
 
 @dataclass(frozen=True, eq=False)
 class RMSError(ISE):
-    """Metric: root mean square of e over time (|e| for one tick) [unit of the quantity]; e: desired minus actual."""
+    """Metric: root mean square of e over time (|e| for a single tick) [unit of the quantity]; e: desired minus
+    actual."""
 
     type: ClassVar[str] = "rms"
     form: ClassVar[str] = "{0}"

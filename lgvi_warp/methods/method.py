@@ -168,9 +168,8 @@ class Method(Summarized, Documented):
         solver: Solver of equation (24) of Nordkvist & Sanyal: "quartic" (default), "cayley", "newton" (on the
             exponential map, as in their paper) or "moser_veselov" (explicit).
         iterations: Number of Newton steps, or fixed-point iterations, of a solve, 0 to 100. None (default) iterates each
-            vehicle to the tolerance. "auto" finds before the run the smallest number with which one trial step of
-            length 2 h converges for every member. A solve that needs more iterations later gives its member the status
-            NOT_CONVERGED.
+            vehicle to the tolerance. "auto" finds before the run the smallest number with which a step of 2 h converges
+            for every member. A solve that needs more iterations later gives its member the status NOT_CONVERGED.
         tolerance: Relative residual of equation (24) above which a solve has not converged, between 0 and 1. By default
             1e-14 in float64 and 1e-6 in float32; for a fixed number of iterations 1e-12 and 1e-5.
         alpha: Weight of the old configuration in the average of nonconservative forces, equation (15), 0 to 1; 0.5 by

@@ -34,8 +34,7 @@ class LinearModel:
     """Discrete linear model of deviations from a motion: x' = A x + B u, y = C x + D u.
 
     x: n states; x': x one period later; u: m inputs; y: the first 12 states: position [m, inertial axes], rotation
-    vector [rad], velocity [m/s], angular velocity [rad/s] (body axes). The other states are memory of actuators and
-    parts.
+    vector [rad], velocity [m/s], angular velocity [rad/s] (body axes). The rest is memory of actuators and parts.
 
     Attributes:
         A: state matrix (n, n).

@@ -64,8 +64,7 @@ class WorstCase(Saved):
 
     @property
     def unseen(self) -> float:
-        """Fraction of the box that a peak must fill to be hit by one of `points` with probability 95 %; 1 without
-        points."""
+        """Smallest fraction of the box at which `points` hit a peak with probability 95 %; 1 without points."""
         return least_peak(self.points)
 
     def _content(self) -> dict[str, Any]:

@@ -26,9 +26,8 @@ class Saltelli(Sampling):
     """Design for Sobol indices, as SALib.sample.sobol: groups of 2 d + 2 members, for d factors.
 
     A factor is an entry that varies independently, or a joint distribution. A group consists of points A and B of one
-    Sobol sequence, A with one factor of B at a time, and B with one factor of A at a time. More groups can be added;
-    the design is balanced if their number is a power of two. Saltelli et al. (2010), Computer Physics Communications
-    181.
+    Sobol sequence, A with one factor of B at a time, and B with one factor of A at a time. More groups can be added; a
+    power of two of them is balanced. Saltelli et al. (2010), Computer Physics Communications 181.
 
     Args:
         second_order: True, the default, allows second-order indices; False gives groups of d + 2 members.

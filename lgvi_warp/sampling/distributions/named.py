@@ -175,8 +175,7 @@ class BinnedDistribution(Distribution):
 class UserDistribution(Distribution):
     """A distribution given by a user's object with quantiles: ppf(u), or icdf(u) as in scipy's new distributions.
 
-    The values are absolute. A file stores only the object's text, so a run that is read from a file needs the ensemble
-    again.
+    The values are absolute. A file stores only text, so a run that is read from a file needs the ensemble again.
 
     Args:
         distribution: The object.

@@ -22,8 +22,7 @@ class OpenTURNSDistribution(JointLaw):
     """A distribution of OpenTURNS, of one number or jointly of several; `vary` also accepts it without this class.
 
     The values are absolute. Several numbers follow from levels one by one, each conditional on the numbers before
-    (Rosenblatt). A file stores only the distribution's text, so a run that is read from a file needs the ensemble
-    again.
+    (Rosenblatt). A file stores only text, so a run that is read from a file needs the ensemble again.
 
     Args:
         distribution: The distribution.

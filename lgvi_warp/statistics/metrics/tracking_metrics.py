@@ -365,8 +365,7 @@ class ITAE(OverTime):
 
 @dataclass(frozen=True, eq=False)
 class RMSError(ISE):
-    """Metric: root mean square of e over time (|e| for a single tick) [unit of the quantity]; e: desired minus
-    actual."""
+    """Metric: root mean square of e over time (|e| for one tick) [unit of the quantity]; e: desired minus actual."""
 
     type: ClassVar[str] = "rms"
     form: ClassVar[str] = "{0}"

@@ -284,7 +284,7 @@ def _reached(curve: np.ndarray, levels: np.ndarray, at: np.ndarray) -> np.ndarra
 class EndTime(OfEnds, MemberStatistic):
     """Statistics of the time [s] at which members ended with an outcome, over the members with this outcome.
 
-    All other members are left out; Outcome takes them into account.
+    All other members are left out; lw.statistics.Outcome takes them into account.
 
     Args:
         of: "floor", "surface" or the name of any event of the scene; "stopped", for all events; a failure; or "failed",

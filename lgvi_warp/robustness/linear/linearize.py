@@ -250,7 +250,7 @@ def command_rows(bench: MotionBench, row: int) -> tuple[int, ...]:
 def loop_rows(bench: MotionBench, memory: Mapping[str, np.ndarray]) -> list[Row]:
     """Memory of a closed loop after a tick.
 
-    Records that ticks make of themselves are left out. So is the demand that was not delivered: only its sign matters,
+    Records that ticks make of themselves are left out. The undelivered demand is left out, too: only its sign matters,
     for the anti-windup of integrals.
     """
     bus: Any = bench.bus
@@ -289,7 +289,7 @@ AS_LINEAR = "of the loop as a linear one: "
 
 
 def of_the_mean(scene: Any, words: Sequence[str] = OF_MEAN_ZERO) -> tuple[Any, tuple[str, ...], tuple[str, ...]]:
-    """A scene without faults, whose sensors lack some errors of mean zero.
+    """The scene without faults and without some sensor errors of mean zero.
 
     Returns: The scene, the names of the numbers that were set to 0, and a message for the user.
     """
@@ -329,7 +329,7 @@ def check_parts(controller: Any, purpose: str, refused: Collection[str] | None =
 
 
 def states_in_use(A: np.ndarray) -> np.ndarray:
-    """Indices of the motion's states in A (n, n) and of states on which others depend; the rest decay within a tick."""
+    """Indices of the motion's states in A (n, n) and of states on which others depend; all else decays in a tick."""
     keep = np.arange(len(A))
     while True:
         some = keep[(keep < 12) | np.any(A[np.ix_(keep, keep)] != 0.0, axis=0)]

@@ -168,7 +168,7 @@ class Margins(Saved):
             of: percentages (k,), in [0, 100].
 
         Returns:
-            Percentiles of each margin, name -> (k,). A percentile is the margin of one member; NaN if none has margins.
+            Percentiles of each margin, name -> (k,). A percentile is one member's margin; NaN if no member has margins.
         """
         quantiles = _percentages(of) / 100.0
         known = {name: v[~np.isnan(v)] for name, v in self._columns().items()}

@@ -154,7 +154,7 @@ class SampledLoop:
     def stable(self, factor: np.ndarray, steps: np.ndarray, some: np.ndarray) -> np.ndarray:
         """Mask of the loops of some members (m,) that settle, with their factors on the demand and delays in steps.
 
-        A loop settles if all eigenvalues of the observed states are within the unit circle, and the others do not grow.
+        A loop settles if all eigenvalues of the observed states are inside the unit circle, and no other state grows.
         """
         answer = np.zeros(len(some), bool)
         for q in np.unique(steps // self.every):

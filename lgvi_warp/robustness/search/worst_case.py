@@ -64,7 +64,7 @@ class WorstCase(Saved):
 
     @property
     def unseen(self) -> float:
-        """Smallest fraction of the box at which `points` hit a peak with probability 95 %; 1 without points."""
+        """Fraction of the box that a peak must fill to be hit with probability 95 %; 1 without points."""
         return least_peak(self.points)
 
     def _content(self) -> dict[str, Any]:

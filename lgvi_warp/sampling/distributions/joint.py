@@ -352,7 +352,7 @@ class PhysicalInertia(PositiveDefinite):
     The second moments of mass are S = tr(J) / 2 - J. `PositiveDefinite` draws S, and the inertia is J = tr(S) - S. A
     mass distribution with inertia J exists if and only if S is positive definite (Wensing, Kim & Slotine 2018, Linear
     matrix inequalities for physically consistent inertial parameter identification). Use it for "vehicle.inertia",
-    whose scene value must be physical, or for "vehicle.rigid_body_mass_matrix". For the latter, S is taken about the
+    whose scene value must be physical, or for "vehicle.rigid_body_mass_matrix". For this matrix, S is taken about the
     centre of gravity, which stays fixed.
 
     Args:

@@ -254,7 +254,7 @@ class SettlingTime(OfCourse):
 class SteadyStateError(Total, OfTracking):
     """Metric: mean of a member's error (desired minus actual value) over the ticks of the last part of the run [unit].
 
-    The unit is that of the quantity. The metric is NaN for members that stopped or failed before the last tick.
+    The unit is the quantity's. The metric is NaN for members that stopped or failed before the last tick.
 
     Args:
         share: the last part, as a fraction of the run's time, above 0 and up to 1; by default 0.1.

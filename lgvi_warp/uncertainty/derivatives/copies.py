@@ -88,7 +88,7 @@ class MovedCopies:
         return numbers
 
     def ensemble(self, each: np.ndarray, numbers: Mapping[str, np.ndarray]) -> Ensemble:
-        """Copies of members with these numbers. Raises SceneError if one is unphysical."""
+        """Copies of members with these numbers. Raises SceneError if a number is unphysical."""
         of_scene = {name: values for name, values in numbers.items() if self._in_scene(name)}
         copies = Ensemble(
             self.scene, len(each), self.fleet.seed, None, Table(values=of_scene) if of_scene else "random"

@@ -158,7 +158,7 @@ def rounded(kind: str, members: float, dimensions: int, power: float = 1.0) -> i
 
 
 def gains(ways: Sequence[Way]) -> dict[str, float]:
-    """Estimator -> predicted cost of plain Monte Carlo in the same setting, divided by the cost of its best way."""
+    """Estimator -> predicted cost of plain Monte Carlo in the same setting, divided by the cost of this estimator."""
     plain = next(way.seconds for way in ways if way.kind == "plain" and len(way.chain) == 1)
     best: dict[str, float] = {}
     for way in ways:

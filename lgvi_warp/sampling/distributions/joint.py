@@ -229,8 +229,8 @@ class AttitudeDistribution(JointLaw):
 class RotationNormal(AttitudeDistribution):
     """Concentrated normal distribution of an attitude, R = R0 exp(hat(v)); for "start.attitude".
 
-    R is the drawn attitude and R0 the scene's. v is a rotation vector in body axes, normal with mean 0. After Barfoot &
-    Furgale (2014), Associating uncertainty with three-dimensional poses, but with v in body axes.
+    R is the drawn attitude and R0 the scene's. v is a rotation vector in body axes, normal with mean 0. Barfoot &
+    Furgale (2014), Associating uncertainty with three-dimensional poses, do the same in other axes.
 
     Args:
         std: Standard deviation of v about each body axis, one number or (3,) [rad].

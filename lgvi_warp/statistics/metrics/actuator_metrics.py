@@ -72,8 +72,8 @@ class Effort(OfChannels):
     Each value counts until the next tick. This is exact for commands, which are held between ticks.
 
     Args:
-        of: "command" (the default): commands after faults, before delays; "actuator": positions after delay, limit and
-            lag; or one channel, "command[2]".
+        of: "command" (the default): commands after faults, before delays; "actuator": positions after delay, fault,
+            limit and lag; or one channel, "command[2]".
     """
 
     type: ClassVar[str] = "effort"

@@ -236,7 +236,7 @@ def _with_states(save: SaveAt | None) -> SaveAt | None:
 class Neighbours:
     """Values of members (n, m), and of copies with one number changed (n, m, k, levels); NaN if a copy does not count.
 
-    increments: (n, k, levels), each a fourth of the one before. status, time: status and end time of the members (n,).
+    increments: (n, k, levels), each a fourth of the last. status, time: status and end time of the members (n,).
     """
 
     at: np.ndarray

@@ -36,7 +36,7 @@ class Estimated(Summarized, Saved):
         pilot_seconds: processor time of the pilot [s].
         plain_seconds: predicted processor time of plain Monte Carlo in this setting, for the same error [s].
         own_seconds: the same prediction at the scene's own step; None if the scene has no step.
-        rivals: estimator -> predicted cost of plain Monte Carlo divided by that of this estimator, in the same setting.
+        rivals: estimator -> predicted cost of plain Monte Carlo divided by the cost of this estimator, in this setting.
         messages: notes for the user.
         recipe: data with which lw.estimate(fleet, of, recipe=...) runs the same members again, bit-identically: seed,
             setting, estimator, and for each level settings, slopes, strata and members.

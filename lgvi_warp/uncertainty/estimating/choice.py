@@ -99,7 +99,7 @@ def candidates(seen: Observed, variance: float, only: str | None = None) -> list
 
 
 def coupled(seen: Observed, count: int, asked: bool = False) -> list[tuple[int, ...]]:
-    """Chains of `count` settings, each correlated with the one before and much cheaper; asked: True allows any cost."""
+    """Chains of `count` settings, each correlated with the last and much cheaper; asked: True allows any cost."""
     chains = []
     for rest in itertools.combinations(range(1, len(seen.z)), count - 1):
         chain = (0, *sorted(rest, key=lambda i: -seen.costs[i]))

@@ -118,7 +118,7 @@ class FirstPassage(Condition, Counted):
     members' chance. A member that fails before it passes counts until its last valid sample. The estimate is NaN if no
     member is known at the first sample. If no member fails, the probability is the fraction of all members. Interval:
     Wilson's, for the number of members at which a simple fraction has the variance of a beta product (Fay, Brittain &
-    Proschan 2013), which accounts for few members at risk. Once no member is at risk, the upper end of the interval
+    Proschan 2013). This accounts for few members at risk. Once no member is at risk, the upper end of the interval
     assumes that all lost members pass.
 
     If the condition holds at a sample but not at the sample before, the member passes where the straight line between

@@ -86,7 +86,7 @@ def scaled_norms(M: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def least_norm(M: np.ndarray, start: np.ndarray) -> float:
-    """Minimum over D of the norm in `scaled_norms`, for one matrix (r, r), to relative 1e-5. It is convex in log D."""
+    """Minimum over D of the norm in `scaled_norms`, for one matrix (r, r), to relative 1e-5; convex in log D."""
     from scipy.optimize import minimize
 
     def norm(x: np.ndarray) -> float:

@@ -49,7 +49,7 @@ class Opened(NamedTuple):
     C: np.ndarray
 
     def at(self, component: int) -> Opened:
-        """The same loops, opened only at one component of the demand; the others are closed."""
+        """The same loops, opened only at one component of the demand; all other components stay closed."""
         others = np.arange(self.B.shape[2]) != component
         A = self.A + self.B[:, :, others] @ self.C[:, others]
         return Opened(self.some, A, self.B[:, :, ~others], self.C[:, ~others])

@@ -89,7 +89,7 @@ class Suggestion:
         reference_error: largest difference between these two runs [`unit`].
         rivals: (setting, us_per_vehicle_second, expected error) of each of the next best settings.
         worst: indices of the members with the largest errors, the largest first. A check of a finished run uses them.
-        asked: the quantity whose error is limited, as the object that this check needs.
+        asked: the quantity whose error is limited, as the object that a check of a finished run needs.
         messages: notes for the user.
     """
 

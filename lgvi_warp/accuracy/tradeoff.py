@@ -247,9 +247,9 @@ def tradeoff(
 ) -> Tradeoff:
     """Measure cost and error of methods, steps, precisions and solvers on the first members of a fleet.
 
-    The cost of a step is the smallest of several readings of its thread's CPU time; all step lengths of a method share
-    it. A message reports readings that disagree. Errors are measured from one of two fine runs, which agree to a tenth
-    of the smallest error shown. If noise acts, all runs share one noise path, drawn at the scene's noise_step or,
+    The cost of a step is the smallest of several readings of its thread's CPU time; all steps of a method share this
+    cost. A message reports readings that disagree. Errors are measured from one of two fine runs, which agree to a
+    tenth of the smallest error shown. If noise acts, all runs share one noise path, drawn at the scene's noise_step or,
     without a noise_step, at a shorter interval than any step tried. If no path can be shared, or the path is too rough
     for errors of members, only statistics are compared, with the statistics of the finest run.
 

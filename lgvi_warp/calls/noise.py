@@ -100,9 +100,9 @@ def checked_indices(indices: Any, members: int | None = None) -> np.ndarray:
 def draws_of(run: Any, indices: Any = None, *, seed: int | None = None, members: int | None = None) -> np.ndarray:
     """Return the standard normals that the random number generator draws in a call without given draws.
 
-    run(X, lw.uq.draws_of(run, indices)) gives the same bits as a call with these indices of the same run prepared
-    without draws="given". The last digit may differ with `rkmk4` in float32, and with width=1. These normals are a
-    starting point for changes, for example of one gust, of the leading draws, or of the noise of a Markov chain.
+    Let `plain` be the same run prepared without draws="given". Then run(X, lw.uq.draws_of(run, indices)) and plain(X,
+    indices=indices) give the same bits; the last digit may differ with `rkmk4` in float32, or with width=1. Change the
+    normals to study one gust, to set the first columns to Sobol points, or to move a Markov chain over the noise.
 
     Args:
         run: A run made by `lw.prepare`.

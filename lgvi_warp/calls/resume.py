@@ -46,7 +46,7 @@ def resume(
         progress: As in `lw.solve`.
         force: Whether to resume on another machine or with other software versions, which may change the bits.
         keepers: The keepers (objects that store a run's data, internal) that were passed to the run.
-        statistics: The statistics that were passed to the run. Needed if one uses a function, which a store cannot save.
+        statistics: The statistics of the run. Needed if a statistic uses a function, which a store cannot save.
 
     Returns:
         The result of the complete run, which reads its samples from the store.

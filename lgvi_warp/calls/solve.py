@@ -95,8 +95,8 @@ def solve(
         on_block: Function to monitor a run. It is called with a copy of each block's Result as soon as the block is
             finished, in the order of the blocks and in the calling thread. By default there is none.
         start: `result.final` of another run of these members, to continue it. With the same settings and numbers, the
-            two runs give the same bits as one long run. Samples, statistics and messages are those of the new run only.
-            By default the members start at t = 0.
+            two runs give the same bits as one long run. Samples, statistics and messages cover the new run only. By
+            default the members start at t = 0.
         tangents: Name or names of numbers, such as "vehicle.mass" or "start.velocity[0]". The derivatives of all
             samples with respect to these numbers are in result.jacobian. The kernel integrates two derivatives at a
             time with the motion. Each derivative takes the time of one to two runs without derivatives. Default: none.

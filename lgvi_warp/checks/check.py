@@ -66,8 +66,8 @@ def check_law(
       member in a packet has no effect. Without noise and memory, forces do not depend on the length of the step.
       Numbers that vary by member have the same effect as shared numbers. `packed` fills the fields that `params` names.
       The law is the same in all body axes and about all origins that a method may choose.
-    * `law` does not depend on velocities, nor on the time unless `timed` is True. With POTENTIAL, force and torque are
-      the derivatives of `potential`, and `energy` adds the same potential.
+    * `law` does not depend on velocities, nor on the time unless `timed` is True. If POTENTIAL is True, force and
+      torque are the derivatives of `potential`, and `energy` adds this potential.
     * `damping`: nu . D nu >= 0 for its matrix D and every velocity nu. With `dissipative = False` the smallest power is
       reported, but a negative power is not a fault.
     * `push`, which Runge-Kutta methods use, adds the same force and torque as `damping` or `load`.

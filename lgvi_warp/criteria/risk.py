@@ -19,7 +19,7 @@ class CVaR:
 
     Args:
         share: Fraction of the members that count as the worst, in (0, 1]; 0.05 by default, for the worst 5 %. If the
-            share is no whole number of members, the least costly of these members counts in part.
+            share is no whole number of members, the least costly of the worst members counts in part.
 
     Raises:
         SceneError: If the share is not in (0, 1].

@@ -164,7 +164,7 @@ def more_seconds(error: float, goal: float, gain: float, last: float) -> float:
 
 
 def time_over(seconds: float, more: float, share: float) -> tuple[str, str]:
-    """Text that the time of a search was over, and which time would suffice: (cause, remedy)."""
+    """Text for a search that used up its time, and the time that would suffice: (cause, remedy)."""
     cause = f"{seconds:g} s were over"
     if not math.isfinite(more):
         return cause, "give more seconds"

@@ -74,7 +74,7 @@ def tried(
 
 @dataclass
 class StepSeries:
-    """Steps of one setting, each half of the one before.
+    """Steps of one setting, each half of the step before.
 
     m: number of steps in the sample's spacing.
     best: smallest error of the steps so far; the error is the larger of position [m] and attitude [rad].

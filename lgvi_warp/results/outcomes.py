@@ -115,7 +115,7 @@ def remarks_on(fields: Mapping[str, np.ndarray]) -> tuple[str, ...]:
 def ticks_with(warnings: np.ndarray, time: np.ndarray, value: np.ndarray, kind: Warnings) -> tuple[str, ...]:
     """Report members with a warning from their ticks, such as iterations that did not converge.
 
-    warnings, time, value: Warning bits of each member, time and value of the most serious warning at its first, (n,).
+    warnings, time, value: Warning bits of each member, time and value at the first of the most serious warning, (n,).
     """
     bits, bit = np.asarray(warnings), int(kind)
     count = int(np.count_nonzero(bits & bit))

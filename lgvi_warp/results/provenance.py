@@ -43,7 +43,7 @@ def when_read(content: Mapping[str, Any]) -> Any:
 def provenance_but_scene(
     plan: Plan, observed: Observation | None = None, fields: Sequence[str] | None = None
 ) -> dict[str, Any]:
-    """The provenance with a function in place of the scene's tables: to list all numbers of a field takes seconds."""
+    """The provenance with a function in place of the scene's tables: listing all numbers of a field takes seconds."""
     content = {
         "scene": Once(plan.ensemble.scene.to_dict),
         "ensemble": plan.ensemble.to_dict(),

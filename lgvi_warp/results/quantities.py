@@ -121,7 +121,7 @@ class EndQuantity(OfResult):
     """Outcome or end time of members, or a quantity at their end or at a time.
 
     "outcome floor" is 1 for members that ended at the floor, else 0. "end_time floor" is the time of this end, and
-    "depth at floor" the depth at it; they are NaN for other members. "depth at 30" is the depth at 30 s.
+    "depth at floor" the depth at this end; both are NaN for other members. "depth at 30" is the depth at 30 s.
 
     kind: "outcome", "end_time" or "at".
     outcome: Name of the outcome; "" for a time.
@@ -345,7 +345,7 @@ def quantities(of: OfInterest | Sequence[OfInterest]) -> tuple[OfResult, ...]:
 
 
 def names_a_metric(request: Any) -> bool:
-    """Whether a request is a metric. A text about the members' ends is none, and "energy" is the energy at the end."""
+    """Whether a request is a metric. A text about the members' ends is not, and "energy" is the energy at the end."""
     a_quantity = isinstance(request, str) and request in KNOWN
     return names_a_statistic(request) and not names_an_end(request) and not a_quantity
 

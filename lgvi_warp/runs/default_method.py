@@ -95,7 +95,7 @@ def messages(method: Method, rates: Rates, h: float, t1: float) -> tuple[str, ..
     """Warn if the step is too long to follow the path.
 
     h: Step [s].
-    t1: End of the time over which the error is estimated [s]; the caller passes at least AHEAD, as in the choice.
+    t1: End of the time over which the error is estimated [s]; the caller passes at least AHEAD, as in `choices`.
     """
     near = method.name in DAMPED and not stable(method, h_rates(rates, h))
     if path_error(method, rates, h, t1) <= ALLOWED and not near:

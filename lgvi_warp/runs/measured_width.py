@@ -33,7 +33,7 @@ class WidthTimes:
 
 
 def candidates(plan: Plan, registers: Sequence[int]) -> list[int]:
-    """Widths at which one number of all vehicles fills these numbers of SIMD registers."""
+    """Widths of packets in which one number of all vehicles fills one of these counts of SIMD registers."""
     found = (n * register_width(plan.dtype) for n in registers)
     return [width for width in found if width in widths.WIDTHS]
 

@@ -145,8 +145,8 @@ class Condition(Statistic):
 
     Args:
         above: lower limit, one number or one for each component, in the quantity's unit; None (the default): no limit.
-        below: upper limit, in the same form. Without limits, the condition holds if a function is not 0, so a function
-            may return true or false; a named quantity needs a limit.
+        below: upper limit, in the same form. A named quantity needs a limit. A function without limits meets the
+            condition where it does not return 0 or false.
     """
 
     above: Any = None

@@ -148,10 +148,10 @@ class Mean(Statistic):
 class Covariance(Statistic):
     """Covariance matrix over members, within one quantity or across several.
 
-    Interval: Student's t (n - 2, for n members) with the standard error from the members' own fourth moments (delta
-    method), which does not assume normal members. For a variance, the interval is computed for its logarithm, which is
-    closer to normal. Fourth moments of few members are biased towards small values; the bias for normal members, a term
-    of order 1 / n, is corrected (Bonett 2006 for variances). With two members the interval is infinite.
+    Interval: Student's t with n - 2 degrees of freedom, and the standard error from the n members' own fourth moments
+    (delta method), which does not assume normal members. For a variance, the interval is computed for its logarithm,
+    which is closer to normal. Fourth moments of few members are biased towards small values; the bias for normal
+    members, a term of order 1 / n, is corrected (Bonett 2006 for variances). With two members the interval is infinite.
 
     Arrays of the estimate, in addition to lower, upper and count (k,), for k sample times and d components:
 

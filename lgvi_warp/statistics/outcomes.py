@@ -96,8 +96,8 @@ class Outcome(OfEnds):
     The probability is Aalen & Johansen's estimate (1978) of the cumulative incidence: a member that another event
     stopped can no longer have this outcome. A member that fails is censored at its failure, unless the outcome is a
     failure. If no member fails, the estimate is the fraction of all members. The probabilities of all events and of
-    "ok" (the end of the run) sum to 1. Interval: Wilson's, with the number of members whose fraction has the variance
-    of a Dirichlet product; if no member fails, this is the number of all members. Times of events are exact, not
+    "ok" (the end of the run) sum to 1. Interval: Wilson's, for the number of members at which a simple fraction has the
+    variance of a Dirichlet product; without failures, this is the number of all members. Times of events are exact, not
     rounded to sample times.
 
     Arrays of the estimate, in addition to lower and upper, at k sample times:
@@ -108,10 +108,10 @@ class Outcome(OfEnds):
       assumption, and it rarely holds (a vehicle that surfaces does not sink). Interval: alone_lower, alone_upper.
     * fraction (k,): members that have ended with the outcome, as a fraction of all members, including failed members;
       fraction_lower, fraction_upper: Wilson's interval.
-    * ended, otherwise, failed (k,): number of members that have ended by each time: with the outcome; in another way;
-      and in another way by a failure.
+    * ended, otherwise, failed (k,): numbers of members that have ended by each time. `ended`: with the outcome;
+      `otherwise`: in any other way; `failed`: those of `otherwise` that failed.
     * count (k,): number of members at risk at each time.
-    * end_time (levels,) [s]: time by which this fraction of the members has ended with the outcome; infinite if never.
+    * end_time (levels,) [s]: time by which each of these fractions of the members has the outcome; infinite if never.
       end_time_lower, end_time_upper follow from the interval of value.
 
     Args:
@@ -284,7 +284,7 @@ def _reached(curve: np.ndarray, levels: np.ndarray, at: np.ndarray) -> np.ndarra
 class EndTime(OfEnds, MemberStatistic):
     """Statistics of the time [s] at which members ended with an outcome, over the members with this outcome.
 
-    All other members are left out; Outcome takes them into account.
+    All other members are left out; lw.statistics.Outcome takes them into account.
 
     Args:
         of: "floor", "surface" or the name of any event of the scene; "stopped", for all events; a failure; or "failed",

@@ -116,24 +116,24 @@ class FirstPassage(Condition, Counted):
     The probability is Aalen & Johansen's estimate. A member that an event stops before the condition holds never
     passes. With stopped="left_out" this member is censored: its chance of passing later is assumed to equal the other
     members' chance. A member that fails before it passes counts until its last valid sample. The estimate is NaN if no
-    member is known at any time. If no member fails, the probability is the fraction of all members. Interval: Wilson's,
-    with the number of members whose fraction has the variance of a beta product (Fay, Brittain & Proschan 2013), which
-    accounts for few members at risk. If no member is at risk, the upper end of the interval allows for all unknown
-    members.
+    member is known at the first sample. If no member fails, the probability is the fraction of all members. Interval:
+    Wilson's, for the number of members at which a simple fraction has the variance of a beta product (Fay, Brittain &
+    Proschan 2013). This accounts for few members at risk. Once no member is at risk, the upper end of the interval
+    assumes that all lost members pass.
 
     If the condition holds at a sample but not at the sample before, the member passes where the straight line between
-    the two values crosses the limit. A quantity that is true or false has no limit; it passes at the sample. A
-    condition that holds only between two samples is missed (an event of the scene checks every step).
+    the two values crosses the limit. For a quantity that is true or false, the member passes at the sample. A condition
+    that holds only between two samples is missed; an event of the scene checks every step.
 
     Arrays of the estimate, in addition to lower and upper, at k sample times:
 
     * value (k,): probability of passing by each time; survival is 1 - value.
-    * passed (k,): number of members that pass in the interval up to each time, after the time before.
+    * passed (k,): number of members that pass in the interval from the previous sample time to each time.
     * lost (k,): number of members that fail in this interval without having passed.
     * stopped (k,): number of members that an event stops in this interval without having passed.
     * count (k,): number of members at risk of passing in this interval.
     * censored: number of members that ran to the end and did not pass.
-    * passage_time (levels,) [s]: time by which this fraction of the members has passed; infinite if never.
+    * passage_time (levels,) [s]: time by which each of these fractions of the members has passed; infinite if never.
       passage_time_lower, passage_time_upper follow from the interval of value.
 
     Args:

@@ -4,9 +4,9 @@
     run.zarr/zarr.json            attributes: provenance, recipe, messages, complete
     run.zarr/position/c.0.3.0     chunk: times 0, block 3 (see layout)
     run.zarr/parts/000000768.npy  the block's parts of the keepers
-    run.zarr/blocks/000000768.json   marker of the finished block that begins with member 768: its files, sizes,
-    checksums run.zarr/kept/                a group like the run's own, with members that were run again for their
-    samples (see kept)
+    run.zarr/blocks/000000768.json   marker of the finished block that begins with member 768: files, sizes, checksums
+    run.zarr/kept/                a group like the run's own, with members that were run again for their samples
+                                  (see kept)
 
 No file contains a date or time of day, so the same run always writes the same bytes.
 """

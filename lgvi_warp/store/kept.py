@@ -50,7 +50,7 @@ class KeptStore(Store):
 
     @property
     def along(self) -> str:
-        """Name of the group's own dimension of members: one shared with the run's group would need the same length."""
+        """Name of the group's own dimension of members: the run's group has another number of members."""
         return KEPT_MEMBER
 
     @property

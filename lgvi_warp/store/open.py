@@ -135,7 +135,7 @@ def open_run(
         members: Members to open: indices from 0, in the order of the result; a slice; or a mask with a truth value for
             each member. By default all members.
         incomplete: Whether to open an unfinished run too. Members that were not run yet read as NaN with status 0.
-        statistics: The statistics that were passed to the run. Needed if one uses a function, which a store cannot save.
+        statistics: The statistics of the run. Needed if a statistic uses a function, which a store cannot save.
 
     Returns:
         The result.

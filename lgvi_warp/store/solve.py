@@ -93,7 +93,7 @@ def resume_stored(
     force: bool = False,
     keepers: Sequence[Keeper] = (),
 ) -> Result:
-    """Run the missing blocks of the run in a folder. Provenance and messages stay those of its start, even elsewhere."""
+    """Run the missing blocks of the run in a folder. Provenance and messages of its start are kept, even elsewhere."""
     observed_before = folder.provenance.get("observed")
     with corrupt_store_as_scene_error(folder.path / ROOT):
         plan = request.plan()

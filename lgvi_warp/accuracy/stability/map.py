@@ -295,7 +295,7 @@ def stability_map(
 
     Classes of a cell:
 
-    * accurate: the error, measured from one of two fine runs that agree ten times better, is small up to error_time;
+    * accurate: up to error_time the error is at most `error`; a fine run ten times as accurate is the reference;
     * bounded: not accurate, but energy and rotation stay bounded up to t1;
     * flagged: energy and rotation stay bounded, but a member has the status of a failure, or a warning;
     * failed: energy or rotation is unbounded or not finite, and the status of a failure or a warning reports it;
@@ -303,7 +303,7 @@ def stability_map(
 
     Energy is bounded if its change (conservative scene) or growth (damped scene) is at most energy_bound times a scale.
     The scale is the largest kinetic energy possible with the start's momenta, plus the largest change of potential
-    energy. If a force may supply energy, the energy is compared with the reference's, up to error_time.
+    energy. If a force may supply energy, the energy is compared with the reference's energy, up to error_time.
 
     Args:
         scene: the scene; its [ensemble] is ignored.

@@ -146,7 +146,7 @@ class MotionBench:
     ) -> Motion:  # fmt: skip
         """Advance members (m,) from step k0 to step k1; numbers: name -> (m, ...) that replace the members' own.
 
-        motion: motions after the tick at step k0; None starts from the members' own at t = 0, with k0 = 0.
+        motion: motions after the tick at step k0; None starts from the members' own motions at t = 0, with k0 = 0.
         watch: called for each block of samples, with the number of its first sample and the samples.
         Returns: The motions after step k1 and its tick; NaN for members that failed.
         """

@@ -62,8 +62,8 @@ def grid_of(response: Response) -> np.ndarray:
 def scaled_norms(M: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Largest singular values (k,) of D M D^-1 with a diagonal D that nearly minimises them, and log D (k, r).
 
-    Their minimum over D bounds the structured singular value for independent complex numbers; for up to three it is
-    exact (Packard, Doyle 1993, Automatica 29(1)).
+    Their minimum over D bounds the structured singular value for independent complex numbers; for up to three numbers
+    the bound is exact (Packard, Doyle 1993, Automatica 29(1)).
     """
     x = np.zeros(M.shape[:2])
     best, at = np.linalg.norm(M, 2, axis=(1, 2)), x
@@ -86,7 +86,7 @@ def scaled_norms(M: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def least_norm(M: np.ndarray, start: np.ndarray) -> float:
-    """Minimum over D of the norm in `scaled_norms`, for one matrix (r, r), to relative 1e-5; it is convex in log D."""
+    """Minimum over D of the norm in `scaled_norms`, for one matrix (r, r), to relative 1e-5; convex in log D."""
     from scipy.optimize import minimize
 
     def norm(x: np.ndarray) -> float:

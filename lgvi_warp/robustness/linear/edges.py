@@ -16,9 +16,9 @@ def edges(
 ) -> np.ndarray:
     """Find for each member (n,) the edge, from `start` to `last`, of a condition that holds at `start`.
 
-    Brackets grow from the guess by doubling steps, and are then halved; in the logarithm, except for whole numbers.
+    Brackets grow from the guess by doubling steps, and are then halved, in the logarithm except for whole numbers.
     start: NaN for members that are left out. guess: NaN or infinite if there is no guess.
-    Returns: (n, 2): the nearest values at which the condition holds and fails; without an edge, the latter is infinite
+    Returns: (n, 2): the nearest values at which the condition holds and fails; without an edge, the second is infinite
         or 0.
     """
     forward, backward = (lambda v: v, lambda v: v) if whole_numbers else (np.log, np.exp)

@@ -33,8 +33,8 @@ INPUTS = ("commands", "wrench")
 class LinearModel:
     """Discrete linear model of deviations from a motion: x' = A x + B u, y = C x + D u.
 
-    x: n states; x': one period later; u: m inputs; y: the first 12 states: position [m, inertial axes], rotation vector
-    [rad], velocity [m/s], angular velocity [rad/s] (body axes). Memory of actuators and control parts follows.
+    x: n states; x': x one period later; u: m inputs; y: the first 12 states: position [m, inertial axes], rotation
+    vector [rad], velocity [m/s], angular velocity [rad/s] (body axes). The rest is memory of actuators and parts.
 
     Attributes:
         A: state matrix (n, n).
@@ -91,7 +91,7 @@ class LinearModel:
             states=tuple(self.states[i] for i in keep), inputs=tuple(self.inputs[i] for i in push))  # fmt: skip
 
     def state_space(self) -> Any:
-        """Convert the model to a StateSpace of python-control (extra: control), for its margins, plots and designs.
+        """Convert the model to a StateSpace of python-control (extra: control), to compute margins and designs.
 
         Returns:
             A control.StateSpace with the names of this model's states, inputs and outputs; dots become underscores.
@@ -135,20 +135,20 @@ def linearize(
     """Linearise one period of the plant with constant commands, or of the closed loop.
 
     Central differences of the run's own steps give the model, so it includes the method, the lags of actuators and the
-    hold of commands. Its errors are step^2 times a third derivative, and round-off / step: about 1e-10. In a closed
-    loop, noise, drift and rounding of sensors are set to 0, their mean, and faults are off.
+    hold of commands. Its errors are step^2 times a third derivative plus round-off / step, together about 1e-10. In a
+    closed loop, noise, drift and rounding of sensors are set to 0, their mean, and faults are off.
 
     Args:
         scene: The scene, without waves and noise; or an Ensemble, whose scene is used.
         about: Motion to linearise about: a result of `lw.linear.trim`; or, in a closed loop, a time [s] of a run. None,
-            the default: the start with commands of 0; in a closed loop the motion after one period.
+            the default: for a plant, the start with commands of 0; for a closed loop, the motion after one period.
         inputs: "commands" of the actuators, the default; or, for a plant only, "wrench": X, Y, Z [N], K, M, N [N m] in
-            body axes about the body's origin, held for a period. The actuators then keep their commands.
+            body axes about the body's origin, held for a period; the actuators keep their commands.
         closed: True includes the controller in the model; the inputs are then added to its commands. Default False.
         period: Period of a plant [s]. Default: the controller's period; without a controller, the step.
         method: As in `lw.solve`. Default: the method of the trim; without a trim, the scene's method.
         h: Step [s]. Default: the step of the trim; without a trim, the scene's step.
-        step: Increment of the central differences; for numbers above 1 it is relative. Default 1e-5.
+        step: Increment of the central differences; above a size of 1, a fraction of the changed number. Default 1e-5.
 
     Returns:
         The model.
@@ -250,7 +250,7 @@ def command_rows(bench: MotionBench, row: int) -> tuple[int, ...]:
 def loop_rows(bench: MotionBench, memory: Mapping[str, np.ndarray]) -> list[Row]:
     """Memory of a closed loop after a tick.
 
-    Records that ticks make of themselves are left out. So is the demand that was not delivered: only its sign matters,
+    Records that ticks make of themselves are left out. The undelivered demand is left out, too: only its sign matters,
     for the anti-windup of integrals.
     """
     bus: Any = bench.bus
@@ -289,7 +289,7 @@ AS_LINEAR = "of the loop as a linear one: "
 
 
 def of_the_mean(scene: Any, words: Sequence[str] = OF_MEAN_ZERO) -> tuple[Any, tuple[str, ...], tuple[str, ...]]:
-    """A scene without faults, whose sensors lack some errors of mean zero.
+    """The scene without faults and without some sensor errors of mean zero.
 
     Returns: The scene, the names of the numbers that were set to 0, and a message for the user.
     """
@@ -329,7 +329,7 @@ def check_parts(controller: Any, purpose: str, refused: Collection[str] | None =
 
 
 def states_in_use(A: np.ndarray) -> np.ndarray:
-    """Indices of the motion's states in A (n, n) and of states on which others depend; the rest decay within a tick."""
+    """Indices of the motion's states in A (n, n) and of states on which others depend; all else decays in a tick."""
     keep = np.arange(len(A))
     while True:
         some = keep[(keep < 12) | np.any(A[np.ix_(keep, keep)] != 0.0, axis=0)]

@@ -73,7 +73,7 @@ class Study:
     def loops(self, places: np.ndarray) -> tuple[list[Loops], np.ndarray]:
         """The loops of members (n,) at their steady motions, grouped by time; reasons (n,) of members without a loop.
 
-        Members whose motion does not repeat after `about`, or that are at a limit, run on for twice the time, and again.
+        Members whose motion does not repeat after `about`, or that are at a limit, run on to twice the time, and so on.
         """
         bench, n, groups = self.bench, len(places), list[Loops]()
         parameters = self.fleet.subset(places).parameters(0, n)

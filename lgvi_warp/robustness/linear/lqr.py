@@ -24,7 +24,7 @@ class Regulator:
 
     Attributes:
         K: the gains (m, n), from each state to each input.
-        P: (n, n), matrix of the minimal cost: from x, the sum of x^T Q x + u^T R u over all ticks is x^T P x.
+        P: (n, n), matrix of the minimal cost: for a start at x, the sum of x^T Q x + u^T R u over all ticks is x^T P x.
         poles: eigenvalues of A - B K (n,), the largest first; A and B are the matrices of the model.
         model: the linear model.
     """
@@ -41,7 +41,7 @@ class Regulator:
             name: Name of the law in the controller; by default its type, "state_feedback".
 
         Returns:
-            The law. Its attitude gains allow for the law's velocity error, which differs from the model's deviation.
+            The law. Its velocity error, unlike the model's, depends on attitude; the attitude gains correct for this.
 
         Raises:
             SceneError: If an input is not a component of a wrench, or a state is not a coordinate of the motion.

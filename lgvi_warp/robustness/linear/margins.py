@@ -87,13 +87,13 @@ class Margins(Saved):
     Attributes:
         loop: key of the law; "all laws" for the whole controller.
         values: margins by name, each (n,), by eigenvalues. "gain_lower", "gain_upper": smallest and largest factor on
-            the demand that the loop tolerates; 0 or infinite if it tolerates all factors tried. "delay": largest
-            tolerated extra delay [s], in whole steps; infinite if it tolerates the longest tried. "phase": phase margin
-            [rad], with its crossover frequency ("phase_frequency" [rad/s]); infinite and NaN if no gain of the loop
+            the demand that the loop tolerates; 0 and infinite if it tolerates all tried factors. "delay": largest
+            tolerated extra delay [s], in whole steps; infinite if it tolerates the longest tried delay. "phase",
+            "phase_frequency": phase margin [rad] and its crossover frequency [rad/s]; infinite and NaN if no gain
             crosses 1. "disk": disk margin of all components of the demand at once; the factors ("disk_gain_lower",
             "disk_gain_upper") and phases ("disk_phase" [rad]) that it guarantees; its frequency ("disk_frequency"
-            [rad/s]). "sensitivity_peak", "complementary_peak" and, for numbers in `to`, such as "position[2]_peak":
-            peak gains, with "..._frequency" [rad/s].
+            [rad/s]). "sensitivity_peak", "complementary_peak" and one for each number in `to`, such as
+            "position[2]_peak": peak gains, with "..._frequency" [rad/s].
         by_runs: the same margins computed by runs, if requested.
         why: (n,), reason why a member has no margins: "does not settle"; "at its limit: thrusters[3]" if a command
             stays at its limit; "moves nothing" if the demand has no effect; or "failed". "" if the member has margins.
@@ -168,7 +168,7 @@ class Margins(Saved):
             of: percentages (k,), in [0, 100].
 
         Returns:
-            Percentiles of each margin, name -> (k,). A percentile is the margin of one member; NaN if none has margins.
+            Percentiles of each margin, name -> (k,). A percentile is one member's margin; NaN if no member has margins.
         """
         quantiles = _percentages(of) / 100.0
         known = {name: v[~np.isnan(v)] for name, v in self._columns().items()}
@@ -274,8 +274,8 @@ def margins(
 
     A member's loop is examined about its motion after `about` seconds. This motion must be steady: over one period,
     velocities, rates, the vertical, commands and quantities held at a set-point change by less than 1e-6, and no
-    command is at its limit. Until then the time is doubled, up to `settle`. A run that starts from the motion, turned
-    by `tilt`, must return to it. If one of these conditions fails, the member has no margins; see `why`.
+    command is at its limit. While it is not steady, the time is doubled, up to `settle`. A run that starts from the
+    motion, turned by `tilt`, must return to it. If one of these conditions fails, the member has no margins; see `why`.
 
     By eigenvalues: margins follow from the eigenvalues of the linearised sampled loop about that motion. The loop is
     affine in the factor on the law's demand, and each delay within a period is linearised, so bisection needs no runs.
@@ -284,12 +284,12 @@ def margins(
     By runs: every member runs with its own factor or delay, and each run halves the brackets of all members' margins.
     The runs start from the same motion, turned by `tilt`. A loop settles if two conditions hold. The swing of its rates
     and commands shrinks from the second to the last third of the run, and is smaller than in the first third. In the
-    last third no command is at its limit, and the body stays within 10 tilts of the motion and turns by less within a
-    period. If the swing shrinks only slightly, a longer run (1.5 times) decides. The tracking error is not examined: a
-    slow integral hides small fast limit cycles in it. If stability changes repeatedly, the margin is one of the
-    changes.
+    last third no command is at its limit, the body stays within 10 `tilt` of the motion, and it turns by less than 10
+    `tilt` within a period. If the swing shrinks only slightly, a run 1.5 times as long decides. Tracking errors are not
+    examined: slow integral action hides small fast limit cycles. If the loop gains and loses stability several times,
+    the margin is one of these changes.
 
-    Noise and drift of sensors, by eigenvalues also rounding, are set to 0, their mean. Faults are off; see `messages`.
+    Noise, drift and, by eigenvalues, rounding of sensors are set to 0, their mean. Faults are off; see `messages`.
 
     The phase margin is the smallest phase shift, lag or lead, of all components of the law's demand that makes the loop
     unstable. For one component it follows from the crossovers of the gain; for several, from the crossovers of the
@@ -301,10 +301,10 @@ def margins(
     + skew) d / 2), |d| < margin (Seiler, Packard, Gahinet 2020, IEEE Control Systems 40(5)). The margin is 1 / (largest
     structured singular value of S + (skew - 1) / 2), with the sensitivity S.
 
-    A peak gain is the largest gain over frequency from a disturbance of the law's demand to an output: the total demand
-    (S, the sensitivity), the law's response (T), or a number of the motion in `to`, per unit of the demand. With
-    several components the gain is the largest singular value, and the peak is the H-infinity norm. The peak is infinite
-    if the gain grows towards frequency 0. The largest peak of all members is the ensemble's worst-case gain.
+    A peak gain is the largest gain over frequency from a disturbance of the law's demand to an output. Outputs are the
+    total demand (S, the sensitivity), the law's response (T), and the numbers of the motion in `to`. With several
+    components the gain is the largest singular value, and the peak is the H-infinity norm. The peak is infinite if the
+    gain grows towards frequency 0. The largest peak of all members is the ensemble's worst-case gain.
 
     Args:
         fleet: An Ensemble, or a Scene whose [ensemble] is used; without waves and noise.

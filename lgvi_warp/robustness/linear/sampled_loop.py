@@ -49,7 +49,7 @@ class Opened(NamedTuple):
     C: np.ndarray
 
     def at(self, component: int) -> Opened:
-        """The same loops, opened only at one component of the demand; the others are closed."""
+        """The same loops, opened only at one component of the demand; all other components stay closed."""
         others = np.arange(self.B.shape[2]) != component
         A = self.A + self.B[:, :, others] @ self.C[:, others]
         return Opened(self.some, A, self.B[:, :, ~others], self.C[:, ~others])
@@ -154,7 +154,7 @@ class SampledLoop:
     def stable(self, factor: np.ndarray, steps: np.ndarray, some: np.ndarray) -> np.ndarray:
         """Mask of the loops of some members (m,) that settle, with their factors on the demand and delays in steps.
 
-        A loop settles if all eigenvalues of the observed states are within the unit circle, and the others do not grow.
+        A loop settles if all eigenvalues of the observed states are inside the unit circle, and no other state grows.
         """
         answer = np.zeros(len(some), bool)
         for q in np.unique(steps // self.every):

@@ -123,7 +123,7 @@ def search(
     """Find the lowest cost in the unit cube of d dimensions, or a cost that is good enough.
 
     Differential evolution (Storn & Price 1997) runs several times from different starts. Then come all corners, if they
-    are few, and a walk along the axes from the best point, whose step shrinks if no neighbour is better.
+    are few, and a walk along the axes from the best point, with a step that shrinks if no neighbour is better.
     report: called with the number of candidates tried. spend: True spends the remaining budget on points spread over
     the cube, and on walks from the best of them.
     """

@@ -101,7 +101,7 @@ def penalised(risk: np.ndarray, constraints: Sequence[Constraint], values: Seque
 def margins_of(
     constraints: Sequence[Constraint], fleet: Ensemble, settings: Mapping[str, Any]
 ) -> tuple[dict[str, np.ndarray], tuple[str, ...]]:
-    """Margins, name of a constraint -> (n,), and messages on effects they leave out; one computation for each loop."""
+    """Margins, name of a constraint -> (n,), messages on effects left out; one computation for each loop."""
     found: dict[str, np.ndarray] = {}
     messages: dict[str, None] = {}
     wanted = [one for one in constraints if one.margin]

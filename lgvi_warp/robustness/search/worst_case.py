@@ -64,7 +64,7 @@ class WorstCase(Saved):
 
     @property
     def unseen(self) -> float:
-        """Fraction of the box that a peak must fill for one of `points` to hit it with probability 95 %; 1 for none."""
+        """Fraction of the box that a peak must fill to be hit with probability 95 %; 1 without points."""
         return least_peak(self.points)
 
     def _content(self) -> dict[str, Any]:
@@ -124,7 +124,7 @@ def worst_case(
     Differential evolution runs several times from different starts; each generation is an ensemble. The corners of the
     box of bounds follow, if they are few, then a local search from the worst point. The rest of the budget goes to
     Sobol points over the whole box and local searches from the worst of them. All members get the same noise. A peak
-    may remain undetected; `unseen` of the answer bounds the fraction of the box that it fills, with probability 95 %.
+    may be missed; `unseen` of the answer bounds the fraction of the box that it fills, with probability 95 %.
 
     Args:
         fleet: A Scene, or an Ensemble, whose scene is used. Numbers that are not searched keep the scene's values.

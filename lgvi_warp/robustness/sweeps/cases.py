@@ -37,9 +37,9 @@ class Case:
             whole "controller", or "terms". An entry of "terms" replaces the term with the same name, or is added.
         vehicle: another vehicle, lw.Vehicle(...), or some of its numbers by field; None (default): the scene's vehicle.
         scene: another scene, to which the other changes are applied; None (default): the sweep's scene.
-        rare: True estimates by lw.rare_event the probability that a member does not pass, even a very small one; or a
-            dict with some arguments of lw.rare_event, {"relative_error": 0.2, "cheaper": [{"h": 0.1}], "most":
-            200_000}. None (default): as the argument `rare` of the sweep.
+        rare: True: lw.rare_event estimates the probability, even if very small, that a member does not pass. A dict
+            does the same and gives some arguments of lw.rare_event, {"relative_error": 0.2, "most": 200_000}. None
+            (default): as the argument `rare` of the sweep.
 
     Raises:
         SceneError: an argument has the wrong type.

@@ -99,7 +99,7 @@ def _of_success(table: SweepTable, a: SweepCell, b: SweepCell) -> PairedComparis
 
 
 def corrected(rows: list[PairedComparison], confidence: float) -> list[PairedComparison]:
-    """Correct p for the number of comparisons; `real` follows from it or, without a test, from the interval."""
+    """Correct p for the number of comparisons; `real` follows from this p or, without a test, from the interval."""
     answers = []
     for row, p in zip(rows, paired.holm(np.array([row.difference.p for row in rows])), strict=True):
         d = row.difference

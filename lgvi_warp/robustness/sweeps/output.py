@@ -131,7 +131,7 @@ class Sweep(SweepTable):
             The answer of `lw.rare_event`: probability, interval, failing members, and the likeliest of them.
 
         Raises:
-            SceneError: there is no such case or point, the case did not request a rare failure, or it was refused.
+            SceneError: no such case or point exists, the case requested no rare failure, or its estimate was refused.
         """
         cell = self.cell(case, at)
         answer = None if self.rares is None else self.rares.of(cell)
@@ -146,7 +146,7 @@ class Sweep(SweepTable):
     def compare_rare(self, first: str, second: str, at: Mapping[str, Any] | None = None) -> list[RareComparison]:
         """Compare the rare failures of two cases at each point of the grid: ratio of their failure probabilities.
 
-        Failing members of each case, A and B, also run in the other, with the same numbers and noise: P(B) / P(A) = P(B
+        Failing members of case A run also in B, and those of B in A, with the same numbers and noise: P(B) / P(A) = P(B
         | A) / P(A | B). If too few fail in both, the two estimates are divided. Holm's method corrects the p-values.
 
         Args:
@@ -182,7 +182,7 @@ class Sweep(SweepTable):
         return ranks(self, at)
 
     def worst(self, count: int = 20, by: str | None = None, case: str | None = None) -> list[dict[str, Any]]:
-        """Find the worst members of all cells: first the members that failed earliest, then the largest of a metric.
+        """Find the worst members of all cells: first failed members, the earliest first, then the largest metrics.
 
         Args:
             count: number of members; by default 20.
@@ -235,7 +235,7 @@ class Sweep(SweepTable):
             Records with input, share, lower, upper, p, slope, and the input's medians over passing and failing members.
 
         Raises:
-            SceneError: there is no such case, point or metric, or it was refused.
+            SceneError: there is no such case, point or metric, or the cell was refused.
         """
         cell = self.cell(case, at)
         passed, inputs = self.passed(cell), self.inputs(cell)

@@ -62,7 +62,7 @@ def sweep(
     and is ignored if the case does not have it. Cells that differ only in numbers share a kernel. If a case is refused
     or does not compile, the result records this, and the other cases run.
 
-    Each member and metric takes 8 bytes. With `out`, only one cell is in memory at a time; without it, all cells are.
+    A metric takes 8 bytes per member. With `out`, one cell at a time is in memory; without `out`, all cells are.
 
     Args:
         scene: The scene, the path of a scene file, or an Ensemble, whose scene, members, seed, vary and sampling are used.
@@ -85,8 +85,8 @@ def sweep(
             metrics, {"success": 1.0, "overshoot depth": 0.1}, metrics in their units. A comparison then has a verdict:
             better or worse (by more than this difference), equivalent (the interval lies within it) or undecided. A
             smaller metric is better, unless `success` gives it only a lower limit. By default None.
-        rare: True estimates by lw.rare_event the probability that a member does not pass, even a very small one, in
-            every cell whose case does not set `rare`; or a dict with some arguments of lw.rare_event,
+        rare: True: in every cell whose case does not set `rare`, lw.rare_event estimates the probability, even if very
+            small, that a member does not pass. A dict does the same and gives some arguments of lw.rare_event,
             {"relative_error": 0.2, "cheaper": [{"h": 0.1}], "most": 200_000}. To compare two cells, the failing members
             of each are also run in the other. None (default): only in cells whose case sets `rare`.
         out: Folder for finished cells: after an interruption, the same call continues and gives the same bytes. Cells

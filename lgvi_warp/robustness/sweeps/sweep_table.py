@@ -131,7 +131,7 @@ class SweepTable:
             The cell.
 
         Raises:
-            SceneError: there is no such cell, there are several, or it was refused.
+            SceneError: no cell or several cells match, or the cell was refused.
         """
         cells = self.cells_of(case, at)
         if len(cells) != 1:
@@ -183,7 +183,7 @@ class SweepTable:
             (value, lower, upper), between 0 and 1: the fraction of the members, and its confidence interval.
 
         Raises:
-            SceneError: there is no such case or point, or it was refused.
+            SceneError: there is no such case or point, or the cell was refused.
         """
         return self._probability(self.passed(self.cell(case, at)))
 
@@ -199,7 +199,7 @@ class SweepTable:
             (value, lower, upper) at each time, as in `success`.
 
         Raises:
-            SceneError: there is no such case or point, or it was refused.
+            SceneError: there is no such case or point, or the cell was refused.
         """
         ends = self.values(case, END, at)
         return [self._probability(ends > time) for time in times]
@@ -219,7 +219,7 @@ class SweepTable:
             Indices of the members, rising.
 
         Raises:
-            SceneError: there is no such case or point, or it was refused.
+            SceneError: there is no such case or point, or the cell was refused.
         """
         return np.flatnonzero(self.passed(self.cell(case, at)) != failed)
 

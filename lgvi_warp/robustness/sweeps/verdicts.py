@@ -36,7 +36,7 @@ def matters_of(matters: Any, metrics: Sequence[str], success: str) -> dict[str, 
 def verdict(difference: Difference, matters: float, real: bool, more_is_better: bool) -> str:
     """Verdict on a difference, given the smallest difference that matters, in its unit.
 
-    Equivalent: the interval lies within +-matters. Better and worse: it is significant, and its interval lies beyond.
+    Equivalent: the interval lies within +-matters. Better, worse: it lies outside, and p is significant.
     """
     lower, upper = difference.lower, difference.upper
     if not more_is_better:

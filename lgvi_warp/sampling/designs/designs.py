@@ -27,7 +27,7 @@ class Saltelli(Sampling):
 
     A factor is an entry that varies independently, or a joint distribution. A group consists of points A and B of one
     Sobol sequence, A with one factor of B at a time, and B with one factor of A at a time. More groups can be added; a
-    number of groups that is a power of two is balanced. Saltelli et al. (2010), Computer Physics Communications 181.
+    power of two of them is balanced. Saltelli et al. (2010), Computer Physics Communications 181.
 
     Args:
         second_order: True, the default, allows second-order indices; False gives groups of d + 2 members.

@@ -28,7 +28,7 @@ class Grid(Sampling):
     Args:
         axes: Name -> a list of values, of an entry such as "start.position[2]" or of the whole quantity; or name -> a
             number of levels. The distribution of the name in `vary` is then divided into this number of equally
-            probable parts, and the medians of the parts are the values; a vector has this number for each entry.
+            probable parts, and the medians of the parts are the values; for a vector, this holds for each entry.
 
     Raises:
         SceneError: If an axis is neither a list of values nor a number of levels. The message lists every fault.

@@ -25,8 +25,8 @@ class Copula(JointLaw):
 
     Args:
         correlation: Correlation (d, d) of the normal scores. If the distributions are not normal, the correlation of
-            the numbers is slightly closer to 0. From rank correlations: 2 sin(pi s / 6) for Spearman's s, sin(pi t / 2)
-            for Kendall's t.
+            the numbers is slightly closer to 0. From rank correlations compute 2 sin(pi s / 6) for Spearman's s, or
+            sin(pi t / 2) for Kendall's t.
         marginals: Distribution of each number: a list in the order of the names, or a mapping of names to
             distributions. A distribution may be one of lgvi_warp, a frozen distribution of scipy.stats, or an object
             with quantiles.

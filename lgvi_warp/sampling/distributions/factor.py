@@ -22,7 +22,7 @@ class Factor(JointLaw):
     In a scene file: "drag_matrix.quadratic" = { factor = { uniform = { low = 0.8, high = 1.2 } } }.
 
     Args:
-        law: Distribution of the factor. Where it otherwise uses the scene's value (such as its mean), it uses 1 here.
+        law: Distribution of the factor. Instead of the scene's value (for example as its mean), it uses 1.
 
     Raises:
         SceneError: If `law` is not a distribution of a single number.

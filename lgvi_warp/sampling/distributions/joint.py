@@ -229,8 +229,8 @@ class AttitudeDistribution(JointLaw):
 class RotationNormal(AttitudeDistribution):
     """Concentrated normal distribution of an attitude, R = R0 exp(hat(v)); for "start.attitude".
 
-    R is the drawn attitude and R0 the scene's. v is a rotation vector in body axes, normal with mean 0. As Barfoot &
-    Furgale (2014), Associating uncertainty with three-dimensional poses, but with the rotation in body axes.
+    R is the drawn attitude and R0 the scene's. v is a rotation vector in body axes, normal with mean 0. Barfoot &
+    Furgale (2014), Associating uncertainty with three-dimensional poses, do the same in other axes.
 
     Args:
         std: Standard deviation of v about each body axis, one number or (3,) [rad].
@@ -352,7 +352,7 @@ class PhysicalInertia(PositiveDefinite):
     The second moments of mass are S = tr(J) / 2 - J. `PositiveDefinite` draws S, and the inertia is J = tr(S) - S. A
     mass distribution with inertia J exists if and only if S is positive definite (Wensing, Kim & Slotine 2018, Linear
     matrix inequalities for physically consistent inertial parameter identification). Use it for "vehicle.inertia",
-    whose scene value must be physical, or for "vehicle.rigid_body_mass_matrix". For the latter, S is taken about the
+    whose scene value must be physical, or for "vehicle.rigid_body_mass_matrix". For this matrix, S is taken about the
     centre of gravity, which stays fixed.
 
     Args:

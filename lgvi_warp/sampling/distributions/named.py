@@ -36,7 +36,7 @@ ADDRESS = re.compile(r" at 0x[0-9a-fA-F]+")
 class ScipyDistribution(Distribution):
     """A frozen distribution of scipy.stats: lw.distributions.ScipyDistribution(scipy.stats.gamma(2.0, scale=3.0)).
 
-    `vary` also accepts the frozen distribution itself. Its values are absolute: the scene's own value is not used.
+    `vary` also accepts the frozen distribution itself. The values are absolute: the scene's own value is not used.
 
     Args:
         distribution: The frozen distribution; each parameter is one number, or one number per component.
@@ -146,7 +146,7 @@ class BinnedDistribution(Distribution):
     scipy.stats.rv_histogram in `vary`; lw.statistics.Histogram is the statistic.
 
     Args:
-        counts: Weights of the bins, (k,), from 0, in any scale.
+        counts: Weights of the bins, (k,), at least 0, on any scale.
         edges: Edges of the bins, (k + 1,), rising, in the unit of the quantity.
     """
 
@@ -175,7 +175,7 @@ class BinnedDistribution(Distribution):
 class UserDistribution(Distribution):
     """A distribution given by a user's object with quantiles: ppf(u), or icdf(u) as in scipy's new distributions.
 
-    Its values are absolute. A file stores only its text, so a run that is read from a file needs the ensemble again.
+    The values are absolute. A file stores only text, so a run that is read from a file needs the ensemble again.
 
     Args:
         distribution: The object.

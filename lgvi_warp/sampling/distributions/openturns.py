@@ -21,14 +21,14 @@ ADDRESS = re.compile(r" at 0x[0-9a-fA-F]+")
 class OpenTURNSDistribution(JointLaw):
     """A distribution of OpenTURNS, of one number or jointly of several; `vary` also accepts it without this class.
 
-    Its values are absolute. Several numbers follow from levels one by one, each conditional on the numbers before
-    (Rosenblatt). A file stores only its text, so a run that is read from a file needs the ensemble again.
+    The values are absolute. Several numbers follow from levels one by one, each conditional on the numbers before
+    (Rosenblatt). A file stores only text, so a run that is read from a file needs the ensemble again.
 
     Args:
         distribution: The distribution.
 
     Raises:
-        SceneError: If it does not give finite numbers in its middle.
+        SceneError: If it does not give finite numbers at levels of 0.5.
     """
 
     distribution: Any = None

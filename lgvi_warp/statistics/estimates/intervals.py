@@ -91,7 +91,7 @@ def of_replicates(each: np.ndarray, confidence: float) -> tuple[np.ndarray, np.n
     docs/theory/estimators.md, (E13).
 
     Both are infinite if an estimate is missing. Among the intervals for randomized quasi-Monte Carlo that L'Ecuyer,
-    Nakayama, Owen & Tuffin (2023) compare, none is more reliable.
+    Nakayama, Owen & Tuffin (2023) compare, no other interval is more reliable.
     """
     R = len(each)
     with np.errstate(invalid="ignore"):

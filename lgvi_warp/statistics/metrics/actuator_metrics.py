@@ -69,11 +69,11 @@ _ALL = {name: all_of(name) for name in CHANNELS}
 class Effort(OfChannels):
     """Metric: integral over time of |command|, summed over channels [unit of the commands, s].
 
-    Each command counts until the next tick. This is exact, since commands are held between ticks. Faults are included,
-    delays are not.
+    Each value counts until the next tick. This is exact for commands, which are held between ticks.
 
     Args:
-        of: "command" (the default), "actuator", or one channel, "command[2]".
+        of: "command" (the default): commands after faults, before delays; "actuator": positions after delay, fault,
+            limit and lag; or one channel, "command[2]".
     """
 
     type: ClassVar[str] = "effort"

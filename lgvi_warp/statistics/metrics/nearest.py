@@ -84,7 +84,7 @@ class Nearest(Metric):
 
     The distance is evaluated at every tick of the controller, or without a controller at the sample times. Between two
     of these times the path is the cubic through both positions and velocities, so the times may be several steps apart.
-    For a member that failed, or that another event stopped, the path up to this end counts.
+    For a member that failed, or that another event stopped, only the path up to its end counts.
 
     Args:
         of: name of an event of the scene, such as "floor".

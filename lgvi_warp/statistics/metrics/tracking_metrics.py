@@ -43,7 +43,7 @@ class OfCourse(Metric):
 
     The goal is constant: the set point of the scene at the first tick, before any reference model; with other guidance,
     the desired value at the first tick. d is the goal minus the actual value, and the step is d at the first tick.
-    "Below" and "beyond" refer to the direction of the step, which is upward if the step is 0.
+    "Below" and "beyond" refer to the direction of the step, which is positive if the step is 0.
 
     Args:
         of: "depth", "heading", "speed", "north" or "east". The goal is the set point, before any reference model; with
@@ -254,7 +254,7 @@ class SettlingTime(OfCourse):
 class SteadyStateError(Total, OfTracking):
     """Metric: mean of a member's error (desired minus actual value) over the ticks of the last part of the run [unit].
 
-    The unit is that of the quantity. The metric is NaN for members that stopped or failed before the last tick.
+    The unit is the quantity's. The metric is NaN for members that stopped or failed before the last tick.
 
     Args:
         share: the last part, as a fraction of the run's time, above 0 and up to 1; by default 0.1.

@@ -22,7 +22,7 @@ class Values:
     Attributes:
         x: (k, d, n), float64; 0 if a member does not count.
         good: (k, n), True for members that count; None if all do.
-        count: (k,), number of members that count; under weights (see `under`) their sum.
+        count: (k,), number of members that count; under weights (see `under`) the sum of the weights.
         single: True if the numbers were float32, so that sorting them in float32 loses nothing.
     """
 

@@ -88,7 +88,7 @@ class MovedCopies:
         return numbers
 
     def ensemble(self, each: np.ndarray, numbers: Mapping[str, np.ndarray]) -> Ensemble:
-        """Copies of members with these numbers. Raises SceneError if one is unphysical."""
+        """Copies of members with these numbers. Raises SceneError if a number is unphysical."""
         of_scene = {name: values for name, values in numbers.items() if self._in_scene(name)}
         copies = Ensemble(
             self.scene, len(each), self.fleet.seed, None, Table(values=of_scene) if of_scene else "random"
@@ -236,7 +236,7 @@ def _with_states(save: SaveAt | None) -> SaveAt | None:
 class Neighbours:
     """Values of members (n, m), and of copies with one number changed (n, m, k, levels); NaN if a copy does not count.
 
-    increments: (n, k, levels), each a fourth of the one before. status, time: status and end time of the members (n,).
+    increments: (n, k, levels), each a fourth of the last. status, time: status and end time of the members (n,).
     """
 
     at: np.ndarray

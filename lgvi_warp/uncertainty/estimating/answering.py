@@ -108,7 +108,7 @@ def looked(pilot: Pilot, chosen: Chosen, coarser: Sequence[Setting]) -> Observed
 
 
 def in_single(pilot: Pilot, top: Setting, coarser: Sequence[Setting]) -> list[Setting]:
-    """Coarse settings, in single precision if plain Monte Carlo costs so much that another kernel pays."""
+    """Coarse settings, in single precision if plain Monte Carlo costs so much that compiling another kernel pays."""
     plain_seconds = pilot.plain_members(top, pilot.first) * pilot.runs.cost(top, pilot.grid(top))
     if not pilot.single or plain_seconds < WORTH_A_KERNEL:
         return list(coarser)
@@ -200,7 +200,7 @@ Round = tuple[float, list[int]]
 
 
 def enough(pilot: Pilot, chosen: Chosen, levels: Sequence[Level]) -> tuple[list[Round], MeanEstimate]:
-    """The estimate; if its error exceeds the requested one, members are added, at most twice and to four times.
+    """The estimate; while its error exceeds the requested one, members are added, in at most two rounds.
 
     The levels with most of the variance grow.
     """

@@ -24,7 +24,7 @@ ALIKE = 2.0
 class StepChange:
     """Change of a statistic from a coarse setting to a fine one, both on the same members and noise.
 
-    value: coarse minus fine. half: half width of its 95 % interval. left: 1 - rho^2. members: number of pairs.
+    value: coarse minus fine. half: half width of its 95 % interval. left: 1 - correlation^2. members: number of pairs.
     alike: True if both have similar spreads, as with chaos; if a step is too long, they differ.
     """
 
@@ -79,8 +79,8 @@ def beyond(halvings: Sequence[StepChange], order: int = 1) -> float:
 
     docs/theory/estimators.md, (E24).
 
-    The last difference may be near 0 by chance. So the one before, divided by four, is taken if that is larger; for a
-    method of order 8, whose differences fall by 256, it is divided by sixteen.
+    The last difference may be near 0 by chance. So the difference before, divided by four, is taken if it is larger;
+    for a method of order 8, whose differences fall by a factor of 256, the divisor is sixteen.
     """
     sizes = [abs(each.value) for each in halvings]
     last = max(sizes[-1], sizes[-2] / max(4.0, 2.0 ** (0.5 * order))) if len(sizes) > 1 else sizes[-1]

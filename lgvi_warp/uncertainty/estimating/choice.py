@@ -99,7 +99,7 @@ def candidates(seen: Observed, variance: float, only: str | None = None) -> list
 
 
 def coupled(seen: Observed, count: int, asked: bool = False) -> list[tuple[int, ...]]:
-    """Chains of `count` settings, each correlated with the one before and much cheaper; asked: True allows any cost."""
+    """Chains of `count` settings, each correlated with the last and much cheaper; asked: True allows any cost."""
     chains = []
     for rest in itertools.combinations(range(1, len(seen.z)), count - 1):
         chain = (0, *sorted(rest, key=lambda i: -seen.costs[i]))
@@ -158,7 +158,7 @@ def rounded(kind: str, members: float, dimensions: int, power: float = 1.0) -> i
 
 
 def gains(ways: Sequence[Way]) -> dict[str, float]:
-    """Estimator -> predicted cost of plain Monte Carlo in the same setting, divided by the cost of its best way."""
+    """Estimator -> predicted cost of plain Monte Carlo in the same setting, divided by the cost of this estimator."""
     plain = next(way.seconds for way in ways if way.kind == "plain" and len(way.chain) == 1)
     best: dict[str, float] = {}
     for way in ways:

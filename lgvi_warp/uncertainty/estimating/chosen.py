@@ -42,7 +42,7 @@ class Chosen:
 
     @property
     def variance(self) -> float:
-        """The sampling variance that the error leaves; a quarter of its square if the bias uses all of it."""
+        """Sampling variance that error and bias leave; a quarter of the error's square if the bias uses it up."""
         return max(self.error**2 - self.bias.mean_square, 0.25 * self.error**2, 1e-300)
 
 

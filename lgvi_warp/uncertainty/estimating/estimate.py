@@ -75,9 +75,9 @@ def estimate(
     Choices use counted costs (steps times force evaluations per step), so the same seed gives the same answer, to the
     bit, on any number of threads. `recipe` of the answer stores the choices, so that the same members can run again.
 
-    A sample of n members can miss up to a fraction 3 / n of all members that behaves differently. To estimate its
-    effect, 512 to 2,048 members spread over all inputs, and members with extreme inputs, are run. A message gives the
-    fraction that a mean may have missed. Rare values of a Choice are separate strata.
+    A sample of n members can miss up to a fraction 3 / n of all members that behaves differently. To estimate the
+    effect of this fraction, 512 to 2,048 members spread over all inputs, and members with extreme inputs, are run. A
+    message gives the fraction of members that a mean may have missed. Rare values of a Choice are separate strata.
 
     Args:
         fleet: the ensemble, or a Scene with one. Members are drawn anew from its distributions, without its sampling.
@@ -91,7 +91,7 @@ def estimate(
         cheaper: scenes that cost less and behave similarly, as tables of changed numbers, such as {"controller.delay":
             0.0}, or as Scenes. They are used only for the coarse levels. Default none.
         method: method of the estimate. Default: the scene's method and one that suits its terms are tried.
-        h: step of the estimate [s]; its bias is reported. If `method` is not given, the scene's method is used.
+        h: step of the estimate [s]; its bias is reported. With `h` and no `method`, the scene's method is used.
         dtype: precision of all levels. Default: the scene's, and "float32" for some coarse levels.
         estimator: the estimator to use: "plain Monte Carlo", "sobol", "regression", "levels" or "levels of sobol".
             Default: the estimator with the lowest predicted cost.
@@ -111,8 +111,8 @@ def estimate(
         The value, its interval and its cost; `print` shows a report.
 
     Raises:
-        SceneError: if arguments are faulty, the statistic is of another kind or has no finite variance, members fail at
-            the finest setting, or `estimator` is not possible.
+        SceneError: if arguments are faulty, `of` is no such statistic or has no finite variance, members fail at the
+            finest setting, or `estimator` is not possible.
         OSError: if `store` cannot be written.
         KeyboardInterrupt: if Ctrl-C interrupts the call. The message reports the progress; there is no answer.
 

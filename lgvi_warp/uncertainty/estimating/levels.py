@@ -279,7 +279,7 @@ class Level:
         return None
 
     def more(self, share: float) -> int:
-        """Number of members to add for a share of the present ones; once or three times all for balanced replicates."""
+        """Number of members to add, a share of the present number; for balanced replicates once or three times it."""
         points = sum(map(len, self.y)) // REPLICATES
         if self.kind == "sobol" and points & (points - 1) == 0:
             return REPLICATES * points * (1 if share <= 1.0 else 3)

@@ -234,7 +234,7 @@ class Ladder:
         return biases_of.biases(self.halvings, self.order)
 
     def settled(self, error: float) -> int:
-        """Index of the coarsest step whose bias is at most half of the error, or else of the finest but one."""
+        """Index of the coarsest step whose bias is at most half of the error, or else of the finest step but one."""
         if len(self.settings) < 2:
             return 0
         found = [i for i, bias in enumerate(self.biases()) if bias.mean_square <= (0.5 * error) ** 2]
@@ -244,7 +244,7 @@ class Ladder:
 def climb(pilot: Pilot, steps: Sequence[Setting], fixed: Setting | None = None, most: float = math.inf) -> Ladder:
     """Run ever finer steps until two agree or their members are uncorrelated.
 
-    Each step costs 64 members, and all together cost 128 of the finest: a tenth of plain Monte Carlo with 1,280.
+    Each step runs 64 members. All steps cost as much as 128 members at the finest, a tenth of 1,280 plain members.
 
     fixed: a requested setting: the ladder ends one step after it.
     most: cost of a member above which a step gains nothing [s].

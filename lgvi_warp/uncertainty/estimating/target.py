@@ -79,7 +79,7 @@ class Sought:
 
     @property
     def tail(self) -> float:
-        """Fraction of members that decides the value: 1; of a quantile the nearer tail; of a cvar a fourth of its level."""
+        """Fraction of members that decides the value: of a quantile its nearer tail, of a cvar level / 4, else 1."""
         # Numbers in a tail are skewed: of a mean of the worst members four times as many are needed.
         return {"quantile": min(self.level, 1.0 - self.level), "cvar": 0.25 * self.level}.get(self.kind, 1.0)
 

@@ -66,14 +66,14 @@ class Footprint(Saved):
     """Positions of the members on the map, and regions that contain shares of them; result of `lw.studies.footprint`.
 
     Attributes:
-        at: "end", the name of an event or outcome, such as "floor", or a time [s] as text: when members are located.
+        at: When members are located: "end", the name of an event or outcome, such as "floor", or a time [s] as text.
         members: Number of members that have a position at this end or time.
         lacking: Number of members without such a position, by outcome, such as {"ok": 700, "non_finite": 3}.
         centre: Mean of the positions (2,), north and east of the origin [m]. Far outliers, up to 5 % of the members,
             are left out; a message gives their number.
         covariance: Covariance of the same positions (2, 2) [m2].
         regions: The regions with shares of 50, 90, 95 and 99 %, if there are enough members for them.
-        growth: For an eighth, a quarter, half and all of the members: (number, area of the 95 % region, interval) [m2].
+        growth: For 1/8, 1/4, 1/2 and all members: (members; area of the 95 % region, low, high) [m2].
         origin: Latitude and longitude of the axes' origin [deg]; None if the scene does not give them.
         places: North and east of some members (m, 2) [m], for figures; at most 1,000, chosen at random.
         messages: Notes for the user.

@@ -159,7 +159,7 @@ class Smoothed(NamedTuple):
         return float(np.count_nonzero(self.density >= level)) if level else np.inf
 
     def within(self, share: float, places: np.ndarray) -> np.ndarray | None:
-        """Pool the covariance (2, 2) [m2] of members (n, 2) [m] within the parts of a share's region; None if it is one."""
+        """Pool the covariance (2, 2) [m2] of members (n, 2) [m] within the parts of a region; None for one part."""
         from scipy.ndimage import label
 
         grid = self.grid
@@ -320,5 +320,5 @@ def effective(weights: np.ndarray) -> float:
 
 
 def least_members(share: float) -> int:
-    """Fewest members for which a region can contain this share of new ones: one of them lies outside."""
+    """Fewest members for which a region can contain this share of new members: one member lies outside."""
     return math.ceil(round(1.0 / (1.0 - share) - 1.0, 9))

@@ -60,12 +60,12 @@ class RareEvent(Saved):
         provenance: scene, distributions, settings, versions and machine.
         paths: with splitting, (times (j + 1,) [s], indices (j,)) of each failing member: between successive times it
             has the noise of this index and of the call's seed, as in `run.states(final, indices=, seed=)`.
-        moved_size: name -> mean distance of failing members from the middle, in standard deviations; all members: 0.80.
-        moved_spread: name -> standard deviation of the failing members divided by that of all members.
-        moved_z: name -> z-score farthest from 0 of these three differences from all members; significant from 4.5 on.
-        by_condition: for an event of several conditions, text of each condition, and "any" and "all" -> (probability,
-            lower, upper) over the whole run; otherwise, or with a status, empty.
-        ancestors: (m,), first-level ancestor of each failing member, or its run with splitting. Members that share an
+        moved_size: name -> mean distance of failing members from the middle [standard deviations]; all members: 0.80.
+        moved_spread: name -> standard deviation of failing members divided by that of all members.
+        moved_z: name -> z-score of the clearest of these three differences from all members; significant from 4.5 on.
+        by_condition: text of each condition, "any" or "all" -> (probability, lower, upper) over the whole run; empty
+            for one condition, or if a status is a condition.
+        ancestors: (m,), first-level ancestor of each failing member; with splitting, its run. Members that share an
             ancestor are dependent.
     """
 

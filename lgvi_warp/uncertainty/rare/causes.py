@@ -57,7 +57,7 @@ def moves_of(u: np.ndarray, weights: np.ndarray, chains: np.ndarray) -> Moves:
 
 
 def noise_score(x: np.ndarray, weights: np.ndarray, chains: np.ndarray, parts: np.ndarray) -> float:
-    """The z-score of the draws (m, k) of a source: the larger of the mean path's and the sum of squares'.
+    """The z-score of a source's draws (m, k): the larger z-score of their mean path and their sum of squares.
 
     docs/theory/rare_events.md, (B17).
     """

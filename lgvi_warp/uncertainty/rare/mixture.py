@@ -218,7 +218,7 @@ def doubts(
 ) -> list[str]:
     """Reasons why the weights are not the answer; empty if they are.
 
-    probability, spread: the chains' answer; None if they did not arrive. failing: each run's failing members (m, d).
+    probability, spread: the chains' answer; None if none reached the event. failing: each run's failing members (m, d).
     asked: the requested relative error. seen: (m,), mask of weighted members where chains went; None for all.
     """
     reasons = []

@@ -74,11 +74,11 @@ def rare_event(
 
     Markov chains of members move level by level towards the event (subset simulation), over the varied numbers and the
     draws of noise, in four independent runs. Importance sampling about the failing members then gives the answer if it
-    passes its checks. Otherwise more chains give it. Events more likely than 1e-3 are sampled directly.
+    passes its checks. Otherwise the answer comes from more chains. Events more likely than 1e-3 are sampled directly.
 
     Args:
         fleet: A Scene or an Ensemble; its distributions in `vary` and its noise make the members differ.
-        limit: The event: a quantity, such as "max(depth) - 40.0", or a function of a Result, above 0 in the event;
+        limit: The event: a quantity, such as "max(depth) - 40.0", or a function of a Result, positive in the event;
             conditions as in a sweep, {"peak depth": {"above": 12.0}}, any of which suffices; or an event's name.
         relative_error: Target relative standard error of the probability, 0.005 to 0.5; 0.1 by default.
         by: "chains", the default, or "splitting", for a scene with noise and an event that develops over time: a

@@ -387,7 +387,7 @@ class RareSearch:
     def importance(self, groups: Groups, chains: tuple[float, float] | None, seen: Witness) -> RareAnswer | None:
         """Importance sampling about the failing members of all runs; None if its answer fails the checks.
 
-        chains: (probability, spread) of the chains, None if they did not arrive. seen: result of the second look.
+        chains: (probability, spread) of the chains; None if none reached the event. seen: result of the second look.
         """
         rng, runs = generator(self.seed, "rare mixture"), [run for each in groups.values() for run in each]
         points = [np.concatenate([run.failing for run in each]) for each in groups.values()]

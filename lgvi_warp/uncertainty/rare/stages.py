@@ -47,7 +47,7 @@ class Stage:
     def next(self, walk: Walk, crossed: AtLook, size: int, generators: Sequence[np.random.Generator]) -> Stage | None:
         """Draw `size` members of each run from states at which members of this stage crossed a level, or None.
 
-        Each state is drawn equally often, up to one (systematic resampling).
+        The numbers of draws of two states differ by at most one (systematic resampling).
         """
         looks = np.concatenate([np.full(len(rows), look) for look, (rows, _) in crossed.items()] or [np.zeros(0, int)])
         rows = np.concatenate([rows for rows, _ in crossed.values()] or [np.zeros(0, int)])
@@ -76,7 +76,7 @@ def walked(
     """Run the members of a stage until they reach a bound of the score; returns checkpoint -> (rows, flock) of those.
 
     score: None if only the event itself is known. log: receives all members at every checkpoint. keys: function of a
-    checkpoint that gives keys (n,) of the noise, by default the stage's. A walk with a store of stretches repeats none.
+    checkpoint that gives keys (n,) of the noise, by default the stage's. A walk with a store repeats no stored stretch.
     """
     if log is None and walk.stretches is not None:
         return walk.stretches(walk, stage, bound, lambda: _walked(walk, score, stage, bound, None, keys))

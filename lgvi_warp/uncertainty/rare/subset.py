@@ -63,7 +63,7 @@ class SubsetRun:
 
     Attributes:
         probability: probability of the event.
-        spread: standard deviation of its relative error, estimated from the run's own chains, which is too small.
+        spread: standard deviation of its relative error, estimated from the run's own chains: an underestimate.
         thresholds: (k,), the smallest limit allowed at each level; the first is -inf.
         limits: limits (n,) of the members of each level.
         acceptance: (k,), fraction of the chains' proposals that were accepted at each level.

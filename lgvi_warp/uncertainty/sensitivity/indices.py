@@ -26,7 +26,7 @@ class Indices(Saved):
         quantities: labels of the quantities of interest (m,).
         mean: mean of the quantities over the design (m,) [their units].
         std: standard deviation of the quantities over the design (m,) [their units].
-        samples: number of groups or paths of the design, or of members of given data, that were used.
+        samples: number of base points or paths of the design that were used; for given data, of members.
         members: number of members that were run.
         failed: number of members that failed.
         confidence: level of the intervals; fields named ..._confidence hold the half widths of intervals.

@@ -76,7 +76,7 @@ def evaluate(
         The quantities of every member, and a mask of failed members.
 
     Raises:
-        SceneError: if arguments are faulty, or if a path is needed but no sampling interval is known.
+        SceneError: if arguments are faulty, or if a quantity needs the path and no sampling interval is known.
 
     Examples:
         >>> import lgvi_warp as lw

@@ -35,9 +35,9 @@ def record(
 ) -> Path | None:
     """Record the fleet for the rerun viewer. The file appears only when it is complete.
 
-    Hulls of the vehicle's shape are drawn for the members and times of `lgvi_warp.select_members`. A hull takes the colour
-    of its outcome at the time at which the member ended. Curves show medians and quantiles over the members that still run
-    at each time. Another recording of the same run has the same ids of recording and application, by which the viewer
+    Hulls of the vehicle's shape are drawn for the members and times of `lgvi_warp.select_members`. When a member ends,
+    its hull takes the colour of its outcome. Curves show medians and quantiles over the members that still run at each
+    time. Another recording of the same run has the same ids of recording and application, by which the viewer
     distinguishes recordings and layouts.
 
     Args:

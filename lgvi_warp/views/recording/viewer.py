@@ -41,7 +41,7 @@ def program() -> Path:
 
 
 def reach(address: str) -> None:
-    """Require that a viewer listens at an address: rerun would wait forever for a missing one."""
+    """Require that a viewer listens at an address: rerun would wait forever for a missing viewer."""
     try:
         _connect(address)
     except (OSError, ValueError) as error:
@@ -64,7 +64,7 @@ def _connect(address: str) -> None:
 
 
 def watched(send: Callable[[], None], address: str, patience: float = PATIENCE, longest: float = LONGEST) -> None:
-    """Send to a viewer for as long as it listens: rerun would wait forever for one that stopped."""
+    """Send to a viewer for as long as it listens: rerun would wait forever for a stopped viewer."""
     raised: list[BaseException] = []
 
     def sending() -> None:

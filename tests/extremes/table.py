@@ -47,11 +47,11 @@ Statuses: {statuses}.
 
 Other extremes are not in the tables. A negative, zero, infinite or subnormal mass or inertia is refused before the
 run. A member whose start is not finite gets NON_FINITE or STEP_TOO_LARGE. It leaves the bits of all other vehicles
-unchanged. The tests have one such member among 100,000, or only such members (`tests/extremes/test_inputs.py`,
-`test_neighbours.py`). With tolerances, the vehicles of a packet share the steps of rk8. A failing vehicle then
-changes the other vehicles of its packet, within their tolerance. Explicit methods such as rk4 never report
+unchanged. The tests run one such member among 100,000, or such members only (`tests/extremes/test_inputs.py`,
+`test_neighbours.py`). With `rtol` and `atol`, the vehicles of a packet share the steps of rk8. A failing vehicle
+then changes the other vehicles of its packet, within their tolerance. Explicit methods such as rk4 never report
 STEP_TOO_LARGE. The kernel sets subnormal numbers (below 1e-38 in float32, 2e-308 in float64) to zero. A body that
-damping brings to rest ends with momenta of about this size. Its steps then take as long as before
+damping brings to rest ends with momenta of about this size. Its late steps take as long as its early steps
 (`tests/extremes/test_rest.py`).
 
 Machine: {cpu}, {simd}. Written by `python -m tests.extremes.table`; do not edit.

@@ -187,7 +187,7 @@ def test_comments_of_a_new_scene_stand_in_a_column(tmp_path, capsys):
     for start in ('name = "remus_100"', "# buoyancy = "):
         (line,) = (line for line in lines if line.startswith(start))
         assert line.rindex("#") == lists.COLUMN
-    assert "lgvi-warp check dive.toml says" in text
+    assert "lgvi-warp check dive.toml validates" in text
     assert "{" + '"' not in text
     assert '"start.angular_velocity" = { normal = { std = 0.01 } }' in text
     named = lw.Scene.named("remus_100")

@@ -90,7 +90,7 @@ def orthogonalise(y: Any, p: Any, channels: int, six: int, L: int, lines: int, z
             size = size + a * a
             remember(y, lines + i * p.count + k, a)
         remember(y, L + 7 * i, size)
-    # Each line leaves all later ones at once: their products wait for one another no more.
+    # Each line leaves all later ones at once: their products do not wait for one another.
     for j in range(six):
         line = lines + j * p.count
         left = zero - less_products(y, line, line, p.count, zero)
@@ -189,14 +189,7 @@ def iterate(y: Any, p: Any, channels: int, six: int, demand: int, busy: Any):
     b = demand + 6
     L = demand + wp.static(VECTORS)
     lines = L + wp.static(MATRICES)
-    loose = zero
-    for k in range(p.count):
-        loose = greatest(loose, positive(busy, unity - absolute(remembered(y, p.work + k)), zero))
-    if any_positive(loose):
-        orthogonalise(y, p, channels, six, L, lines, zero)
-    else:
-        clear(y, L, L + 36, zero)
-        clear(y, lines, lines + 6 * p.count, zero)
+    orthogonalise(y, p, channels, six, L, lines, zero)
     noise = zero
     for i in range(six):
         r = remembered(y, demand + i)

@@ -303,6 +303,7 @@ class LinearMPC(ControlLaw):
         words = {"states": n, "inputs": m, "horizon": self.horizon, "iterations": self.iterations}
         rated = int(self.rate_limit is not None)
         words |= {"rated": rated, "unmet": self.bus.unmet, "unconverged": self.bus.unconverged}
+        # 12 and 9 rows a constraint and a side, OF_EACH and OF_SIDE of the device code; 3 are read behind the factor.
         work = len(COORDINATES) + len(COMPONENTS) + 2 * n + 2 * m + 5 * k + 12 * (1 + rated) * k + k * (k + 1) // 2 + 3
         if self.limits_more:
             p = 0 if self.outputs is None else len(self.outputs)

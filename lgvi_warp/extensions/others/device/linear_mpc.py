@@ -221,7 +221,7 @@ def slope_at(y: Any, k: int, f: int, cost: int, v: int, slope: int, L: int):
         remember(y, slope + i, -remembered(y, f + i))
     q = int(0)
     while q < entry(k, k, k - 1):
-        remember(y, L + q, row1(y, cost + q) * ones(y.b.x))
+        remember(y, L + q, row1(y, cost + q))
         q += 1
     for j in range(k):
         at = L + entry(k, j, j)

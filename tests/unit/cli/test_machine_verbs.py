@@ -32,13 +32,16 @@ from tests.unit.cli.test_terminal import document
 PAPER = str(ROOT / "examples" / "paper.toml")
 
 
-def test_info_of_the_machine(capsys):
+def test_info_of_the_machine(capsys, monkeypatch):
+    cache = installed.kernel_cache()
+    monkeypatch.setattr(installed, "kernel_cache", lambda: cache)  # other tests compile meanwhile
     peak = {"float64": 1.25e10, "float32": 2.5e10}
     content = document(["info"], capsys, peak_of=peak.get)
     assert content["machine"] == machine.describe()
     assert content["memory"] == machine.memory_bytes()
     assert content["versions"] == machine.versions()
     assert content["peak"] == peak
+    assert content["cache"] == {"path": str(cache["path"]), "bytes": cache["bytes"]}
     assert content["packets"] == {kernel: {"vehicles": width.lanes, "source": width.source} for kernel in widths.KERNELS
                                   for width in [widths.of_table(*widths.parts(kernel))]}  # fmt: skip
     assert main(["info"], peak_of=peak.get) == 0

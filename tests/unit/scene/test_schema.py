@@ -92,7 +92,7 @@ def test_keys_are_described():
     assert mass == {"type": "number", "description": "Dry mass [kg]. Simple form."}
     floor = next(entry for entry in SCHEMA["properties"]["events"]["items"]["anyOf"]
                  if entry["properties"]["type"] == {"const": "floor"})  # fmt: skip
-    assert floor["properties"]["depth"]["description"].startswith("Depth of the floor [m]; or a grid of depths")
+    assert floor["properties"]["depth"]["description"].startswith("Depth of the floor [m]; or an array of depths")
     assert sorted(floor["required"]) == ["depth", "type"]
 
 

@@ -157,30 +157,30 @@ class Method(Summarized, Documented):
             * "phi", "phi_adjoint", "psi": the maps of Nordkvist & Sanyal 2010;
             * "psi_s" (default), "psi_1", "psi_x", "psi_x8", "psi_w": symmetric splittings of order 2;
             * a composition of a symmetric method, such as "tj4(psi_s)", "su4(psi_s)", "kl6(psi_1)" or "kl8(psi_s)";
-              or of the two halves of its step: "bm4(psi_x)", "bm6(psi_x)";
-            * "rkn4_6", "rkn6_11", "rkn6_14": splittings into two parts, only for weight, buoyancy and their moments;
-            * "gauss4" to "gauss12": Gauss collocation with fixed-point iteration, for forces that depend on position
-              and time;
+              or a composition of the two halves of its step, such as "bm4(psi_x)" or "bm6(psi_x)";
+            * "rkn4_6", "rkn6_11", "rkn6_14": two-part splittings, for scenes with no forces but weight and buoyancy;
+            * "gauss4" to "gauss12": Gauss collocation with fixed-point iteration, for forces that depend only on
+              position and time;
             * explicit Runge-Kutta methods that store two rows of the attitude matrix: "rk4", "rk5" (Dormand & Prince),
               "rk5_ck" (Cash & Karp), "rk8" (of DOP853); explicit methods on the rotation group: "cg3" (Crouch &
               Grossman), "rkmk4" (Munthe-Kaas);
             * "rkw3": linearly implicit in the damping, for strong damping and steady motion; without damping it is "rk4".
         solver: Solver of equation (24) of Nordkvist & Sanyal: "quartic" (default), "cayley", "newton" (on the
             exponential map, as in their paper) or "moser_veselov" (explicit).
-        iterations: Number of Newton steps, or fixed-point iterations, of a solve, 0 to 100. None (default) iterates each
-            vehicle to the tolerance. "auto" finds before the run the smallest number with which a step of 2 h converges
-            for every member. A solve that needs more iterations later gives its member the status NOT_CONVERGED.
+        iterations: Number of Newton steps or fixed-point iterations of a solve, 0 to 100. With None (default), a solve
+            iterates to the tolerance. "auto" finds before the run the smallest number with which a trial step of twice
+            the run's step converges for every member. A member whose solve later needs more gets status NOT_CONVERGED.
         tolerance: Relative residual of equation (24) above which a solve has not converged, between 0 and 1. By default
-            1e-14 in float64 and 1e-6 in float32; for a fixed number of iterations 1e-12 and 1e-5.
+            it is 1e-14 in float64 and 1e-6 in float32, or 1e-12 and 1e-5 for a fixed number of iterations.
         alpha: Weight of the old configuration in the average of nonconservative forces, equation (15), 0 to 1; 0.5 by
             default. It is used in phi, phi_adjoint and psi only.
-        beta: The same weight for nonconservative torques, equation (16).
-        rtol: Relative tolerance of the step control of rk5, rk5_ck and rk8; None, the default, for a fixed step. The
-            root mean square of (estimated error of y_i) / (atol + rtol |y_i|) stays below 1; the y_i are position,
+        beta: Weight of the old configuration in the average of nonconservative torques, equation (16); as `alpha`.
+        rtol: Relative tolerance of the step control of rk5, rk5_ck and rk8. By default (None) the step is fixed. The
+            root mean square of (estimated error of y_i) / (atol + rtol |y_i|) stays below 1. The y_i are position,
             attitude, and momenta divided by the largest inertia. The vehicle with the largest error sets its packet's
-            step. `h` is then the longest step; samples, events and statuses are taken at multiples of `h`.
+            step. The argument `h` is the longest step; samples, events and statuses are taken at multiples of `h`.
         atol: Absolute tolerance of the step control; give both tolerances or none.
-        reason: Reason of an automatic choice of the method, for the summary and the provenance; "" by default.
+        reason: Reason for an automatic choice of the method, for the summary and the provenance; "" by default.
 
     Attributes:
         order: Order of convergence in the step.

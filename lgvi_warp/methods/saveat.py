@@ -23,12 +23,12 @@ class SaveAt:
     """Samples that a run keeps. The start and the end are always kept.
 
     Args:
-        every: Interval between samples [s], counted from the start. None, the default, keeps only the start and the end.
+        every: Interval between samples [s], counted from the start. By default only the start and the end are kept.
         at: Increasing times of samples [s], >= 0; None by default. Give `every` or `at`, not both. Each time must be a
             whole number of steps, to within 1e-9 of a step, or to the precision of float32 for times in float32.
         fields: Any of "position", "attitude", "velocity", "angular_velocity"; by default all four. An omitted field
-            takes no memory. With a controller, any of its signals, too: "command", "actuator", "demand", "unmet",
-            "exerted", "measured_..." and "reference_..." (see lw.Result). With a term `lw.terms.EnergyUse`, also
+            takes no memory. The signals of a controller can be added: "command", "actuator", "demand", "unmet",
+            "exerted", "measured_..." and "reference_..." (see lw.Result). A term `lw.terms.EnergyUse` adds the field
             "energy_used".
         final: Whether to keep `result.final`, from which a run can be continued: the states at the end, and the memory
             of forces, actuators and controllers. By default True if the samples of all members are kept and there are

@@ -70,10 +70,10 @@ def to_momenta(M: np.ndarray, J: np.ndarray, nu: np.ndarray, Om: np.ndarray) -> 
     """Momenta of velocities, p = M nu and pi = J Om.
 
     Args:
-        M: Mass, (..., 3, 3) [kg].
+        M: Mass matrix, (..., 3, 3) [kg].
         J: Inertia, (..., 3, 3) [kg m2].
-        nu: Velocity, (..., 3) [m/s], body axes.
-        Om: Angular velocity, (..., 3) [rad/s], body axes.
+        nu: Velocity, (..., 3) [m/s], in body axes.
+        Om: Angular velocity, (..., 3) [rad/s], in body axes.
 
     Returns:
         p (..., 3) [N s] and pi (..., 3) [N m s].
@@ -151,7 +151,7 @@ def rotations(R: np.ndarray, limit: float = ORTHOGONAL) -> np.ndarray:
 
     Args:
         R: Matrices (..., 3, 3).
-        limit: Largest size of an entry of R^T R - I, by default 1e-9.
+        limit: Largest size of an entry of R^T R - I (I: identity), by default 1e-9.
 
     Returns:
         Mask (...), False for matrices that are not finite.

@@ -30,9 +30,9 @@ MOST_DRIFT = 0.1
 class Final(Summarized):
     """Final states of n members of a run, and the memory of forces, actuators and controllers.
 
-    A run can continue from it: `lw.solve(..., start=final)`, `lw.prepare(...).states(final)`. With the same scene,
-    members and settings, both parts are bit-identical to a single run. With other settings or other numbers of the
-    members, or after `changed`, the run continues from the states and the memory.
+    A run can continue from them: `lw.solve(..., start=final)`, `lw.prepare(...).states(final)`. With the same scene,
+    members and settings, the two runs give the same bits as a single run. With other settings or other numbers of the
+    members, or after `changed`, the second run starts from `states` and the memory.
 
     Attributes:
         time: Time [s] since t = 0 of the first run.
@@ -45,8 +45,8 @@ class Final(Summarized):
         seed: Seed of the ensemble.
         parameters: Parameters of the members by name, each with a first dimension of 1 or n.
         lanes: Arrays (n, rows) by name, in the form of the kernel: state, memory and outcome of each member.
-        settings: Settings for which `lanes` holds: method, step, number type and laws. Empty if members continue from
-            `states` instead, as after `changed`.
+        settings: Settings of the run: method, step, number type and laws. A run with other settings continues from
+            `states` instead of `lanes`; so does every run if `settings` is empty, as after `changed`.
 
     Methods:
         part: Select members.
@@ -118,7 +118,7 @@ class Final(Summarized):
         """Select members, in the given order; a member may occur several times.
 
         Args:
-            places: Positions of m members among the n members (m,), counted from 0; a slice; or a mask (n,).
+            places: Indices (m,) of m members among the n members, counted from 0; a slice; or a mask (n,).
 
         Returns:
             The final states of these members.
@@ -134,7 +134,7 @@ class Final(Summarized):
         )
 
     def changed(self, **states: Any) -> Final:
-        """Replace states of the members; their memory is kept.
+        """Replace states of the members; forces, actuators and controllers keep their memory.
 
         Args:
             states: New arrays by name, as in the attribute `states`: any of position (n, 3) [m], attitude (n, 3, 3),
@@ -159,7 +159,7 @@ class Final(Summarized):
         return replace(self, states={**self.states, **arrays}, lanes=lanes, settings={})
 
     def to_arrays(self) -> dict[str, np.ndarray]:
-        """Convert to the arrays that `from_arrays` reads; its `numbers` and `parameters` are not included.
+        """Convert to the arrays that `from_arrays` reads, without its other arguments `numbers` and `parameters`.
 
         Returns:
             Arrays (n, ...) by name.
@@ -179,7 +179,7 @@ class Final(Summarized):
 
         Args:
             arrays: Arrays by name, as returned by `to_arrays`; arrays with other names are ignored.
-            numbers: Attributes by name: time, step, steps, seed and settings.
+            numbers: Attributes of the final states by name: time, step, steps, seed and settings.
             parameters: Parameters of the members by name.
 
         Returns:

@@ -256,17 +256,17 @@ def from_fossen(
 ) -> dict[str, Any]:
     """Build a vehicle and its drag from hydrodynamic derivatives in Fossen's (SNAME) names and signs.
 
-    It is enough to give one of a symmetric pair such as Y_rdot, N_vdot. These coefficients are refused:
+    One coefficient of a symmetric pair, such as Y_rdot and N_vdot, is enough. These coefficients are refused:
 
     * X_qq and similar coefficients, whose force is even in the velocity and therefore is not drag;
-    * products (Y_uv, X_wq). Products due to added mass (its Coriolis terms) follow from its matrix. Products
+    * products (Y_uv, X_wq). Products due to added mass (its Coriolis terms) follow from the added mass matrix. Products
       with u are a hull's lift: use the term body_lift. The term quadratic_form accepts any product;
     * second-order moduli such as Y_|v|r (Fossen 2021, nonlinear damping). They are cross-flow drag due to sway and yaw
       together, which a drag matrix cannot represent. The term cross_flow computes this drag along the hull.
 
     Args:
         coefficients: Values by name: X_udot ... N_rdot [kg, kg m, kg m2], X_u ... N_r [N s/m, N m s],
-            X_uu ... N_rr [N s2/m2, N m s2], in any usual spelling; negative on the diagonal.
+            X_uu ... N_rr [N s2/m2, N m s2], in any usual spelling. Diagonal ones, such as X_u and K_p, are negative.
         mass: Mass [kg].
         inertia: Inertia (3,) or (3, 3) [kg m2], about the point that `inertia_about` names.
         center_of_gravity: Position (3,) [m] from the body origin; by default the origin.

@@ -45,9 +45,9 @@ class PackingContext:
         h: Step [s].
         aligned: Whether all members of the run have the user's axes in the kernel, up to order and sign, and the user's
             origin for the forces; False by default.
-        time: Time at which the members start or continue [s]; 0 by default.
-        remembered: Memory of the term if members continue, (n, rows) as in `Packed.memory`; None, the default, if they start.
-        given: Standard normal numbers that the caller of a prepared run passes; None, the default: the kernel draws them.
+        time: Time at which the members start or continue a run [s]; 0 by default.
+        remembered: Memory of the term, (n, rows) as in `Packed.memory`, if members continue a run; otherwise None (default).
+        given: Standard normal numbers that the caller of a prepared run passes; None, the default, if the kernel draws them.
     """
 
     parameters: Numbers
@@ -463,7 +463,7 @@ class Term(Documented):
             position: Positions (n, 3) [m].
 
         Returns:
-            {field: (mask of the members concerned (n,), reason)}; in the reason, {} stands for the depth.
+            {field: (mask of the members concerned (n,), reason)}; the text `reason` has {} in the place of the depth.
         """
         return {}
 
@@ -487,9 +487,9 @@ class Term(Documented):
     def conserves(self) -> frozenset[str]:
         """Quantities, among those in `CONSERVED`, that a motion conserves if only this law acts.
 
-        By default this is the energy, if the device code is POTENTIAL and has no other role, and `potential` is defined and
-        does not depend on time. Any other law conserves nothing by default. A law whose potential depends only on depth and
-        on the attitude relative to the vertical conserves all three quantities; its author should override this property.
+        By default a law conserves energy if its device code is POTENTIAL without other roles, its class defines `potential`,
+        and it is not `timed` and has no memory. Other laws conserve nothing by default. If the potential depends only on depth
+        and attitude relative to the vertical, the law conserves all three quantities; its author should override this.
         """
         device = self.device
         follows = getattr(device, "POTENTIAL", False) and type(self).potential is not Term.potential
@@ -788,7 +788,7 @@ def knots(at: np.ndarray, values: np.ndarray, steps: bool = False) -> np.ndarray
     Args:
         at: Arguments at the knots (1 or n, k), rising, in the unit of the table's argument; k is 2 or more.
         values: Values at the knots, (1 or n, k, 1) for `table1`, (1 or n, k, 3) for `table3`.
-        steps: Whether each value is constant up to the next knot, and then jumps.
+        steps: Whether each value is constant up to the next knot, and then jumps; False by default.
 
     Returns:
         Rows (1 or n, d + (k - 1) (d + 2)), where a value has d numbers: the first value, then for each interval its start,

@@ -42,24 +42,24 @@ class ControlFins(Commanded, Fins):
         area: Area A, (n,) [m2].
         drag: Drag coefficient along the flow, (n,).
         drag_normal: Factor of sin^2 a in the drag coefficient, where a is the angle of attack, (n,); 0 by default.
-        lift_slope: Slope of the lift coefficient, (n,) [1/rad]. With a table of lift, a factor on its coefficients, 1 by
-            default.
-        lift_angles: Angles of attack of a table of lift, (k,) [rad], rising from 0; none by default.
+        lift_slope: Slope of the lift coefficient, (n,) [1/rad]. With a table of lift, it is a factor on the coefficients of
+            the table, 1 by default.
+        lift_angles: Angles of attack of a table of lift, (k,) [rad], rising from 0; by default there is no table.
         lift_coefficients: Lift coefficients at these angles, (k,) [1], linear between the angles and constant beyond the
             last one. At negative angles they have the opposite sign.
         flow_angle: Whether the angle of the flow adds to the deflection, True by default. If False, let d be the deflection
             and u the flow along the chord: the lift is rho A/2 lift_slope d u^2, and the drag is
             rho A/2 (drag + drag_normal d^2) |u| u, where rho is the density of the water.
         limit: Largest size of the deflection, (n,) [rad]; 0.35 by default.
-        rate_limit: Largest rate of the deflection, (n,) [rad/s]; by default no limit.
-        time_constant: Time constant of the lag of the deflection, (n,) [s]; by default no lag.
+        rate_limit: Largest rate of the deflection, (n,) [rad/s]; by default there is no limit.
+        time_constant: Time constant of the lag of the deflection, (n,) [s]; by default there is no lag.
         command: Constant deflection, (n,) [rad].
         times: Times of the schedule, (k,) [s], rising.
         command_schedule: Deflections at these times, (k, n) [rad], linear between them; instead of `command`.
 
     Raises:
         SceneError: If times or angles do not rise, the command is given twice, neither a slope nor a table of lift is given,
-            or for a reason listed at `Fins`.
+            chord and normal are parallel, or a number is invalid (see `Term`).
     """
 
     type: ClassVar[str] = "control_fins"

@@ -24,7 +24,7 @@ class ControlWrench(Term):
 
     Args:
         limit: Largest size of each component, (6,) [N, N m]; 1e6 by default.
-        rate_limit: Largest rate of each component, (6,) [N/s, N m/s]; by default no limit.
+        rate_limit: Largest rate of each component, (6,) [N/s, N m/s]; by default there is no limit.
         time_constant: Time constant of the lag of each component, (6,) [s]; 0 by default, for no lag.
     """
 

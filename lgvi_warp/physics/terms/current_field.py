@@ -104,19 +104,19 @@ class CurrentField(InFile, Term):
             origin: Latitude and longitude [deg] of the origin of the inertial axes, (2,).
             start: Date and time of t = 0: a datetime or a text in ISO 8601, in UTC unless it names a time zone; by default
                 the first time of the data.
-            region: Least and largest north, east and depth to read, (3, 2) [m]; by default all the data.
-            speed: Largest speed over ground [m/s], to compute the region instead of giving `region`: the region that a
-                vehicle starting at `around` can reach in `duration`.
-            duration: Length of the time from the start to read [s]; by default to the end of the data.
-            around: Start position of members [m], (3,), for `speed`; zeros by default.
+            region: Least and largest north, east and depth to read, (3, 2) [m]; by default all the data are read.
+            speed: Largest speed over ground [m/s], instead of `region`. The region is then the one that a vehicle starting
+                at `around` can reach in `duration`.
+            duration: Length of the period to read [s], from `start`; by default it ends with the data.
+            around: Start position of members [m], (3,), for use with `speed`; zeros by default.
             variables: Names of the eastward, northward and, if there is one, upward velocity; by default the variables with
                 the usual standard_name or the usual name in models.
-            spacing: Distances between the nodes of the regular grid [m], (3,); by default at least as fine as the data, with
-                at most 100 levels in depth.
+            spacing: Distances between the nodes of the regular grid [m], (3,); by default the grid is at least as fine as the
+                data, with at most 100 levels in depth.
             fill: Treatment of missing values, on land and below the sea floor: "nearest", the default, "zero", or "refuse".
             checksum: Checksum of the numbers of the file; a changed file is refused. By default any file is read.
-            attributes: Missing or wrong attributes of the file, for instance {"u.units": "m s-1"}; a key without a
-                variable is an attribute of the file itself.
+            attributes: Values for missing or wrong attributes of the file, for instance {"u.units": "m s-1"}; a key without
+                a variable is an attribute of the file itself.
             outside: As in the class; "stop" by default.
             scenario: As in the class. Scenarios are the dimension `realization`, `member`, `ensemble` or `number`.
             name: As in `Term`.
@@ -130,7 +130,7 @@ class CurrentField(InFile, Term):
             MissingExtra: If xarray, a reader of NetCDF or pyproj is not installed.
 
         Examples:
-            A shear of 1 m/s per 0.1 degrees to the north, and its velocity 5 km north of the origin.
+            A current whose eastward velocity rises by 1 m/s per 0.1 degrees to the north, and its value 5 km north.
 
             >>> import lgvi_warp as lw
             >>> import numpy as np

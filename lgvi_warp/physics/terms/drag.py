@@ -158,8 +158,8 @@ class DragMatrix(Term):
         quadratic: Quadratic coefficients, (6, 6) [N s2/m2, N s2, N m s2]; 0 by default.
 
     Raises:
-        SceneError: If a matrix creates energy, since its power nu.D nu is negative at some velocity, or a number is invalid
-            (see `Term`). For the quadratic matrix, the test searches by descents from the worst of 4,000 directions.
+        SceneError: If the drag of a matrix would accelerate the vehicle at some velocity, or a number is invalid (see
+            `Term`). For the quadratic matrix, the test searches by descents from the worst of 4,000 directions.
     """
 
     type: ClassVar[str] = "drag_matrix"

@@ -13,8 +13,8 @@ from lgvi_warp.physics.terms.base import CONSERVED, Term, number
 class EnergyUse(Term):
     """The account of the energy used: `energy_used` [J] is the time integral of the hotel load and of the power of all terms.
 
-    The power of thrusters follows from their `power` or `shaft_speed`, the power of pumps from their `efficiency`. A scene
-    without this term has no account. The account starts at 0 and continues when a run is continued. Its value
+    The power of thrusters follows from their `power` or `shaft_speed`; the power of pumps follows from their `efficiency`. A
+    scene without this term has no account. The account starts at 0 and continues when a run is continued. Its value
     can be saved as a sample, `lw.SaveAt(fields=[..., "energy_used"])`, and is a quantity of statistics.
 
     Args:

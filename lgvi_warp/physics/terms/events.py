@@ -159,7 +159,7 @@ class Battery(Event):
 class MissionDone(Event):
     """Stop a member at the tick at which it has reached its last waypoint and completed the circles requested there.
 
-    With `at_end = "loiter"` and no turns or time at the last point, the mission is done when the circle begins. If the
+    With `at_end = "loiter"`, if the last point has no turns or time, the mission is done when the circle begins. If the
     mission is done at the last tick of a run, the member ends as "ok".
 
     Args:
@@ -214,7 +214,7 @@ class MissionDone(Event):
 class Outside(Event):
     """Stop a member when the body's origin leaves the grid of a `current_field`, or sinks below its last level.
 
-    A field with `outside = "stop"` adds this event to its scene itself; for any other field the event is refused. Along an
+    A field with `outside = "stop"` adds this event to its scene; a scene refuses the event for any other field. Along an
     axis with only one node, and above the first level, members do not stop.
 
     Args:

@@ -35,7 +35,7 @@ class Floor(InFile, Event):
         depth: Depth of the floor [m]; or an array of depths of shape (nodes along north, nodes along east) [m].
         origin: Position of the grid's first node, (2,) [m]: north and east; zeros by default.
         spacing: Distance between nodes along north and east, (2,) [m]; required with a grid.
-        clearance: Height above the floor at which members stop [m]; 0 if omitted. To vary it by member, give a value here.
+        clearance: Height above the floor at which members stop [m]; 0 if omitted. To vary it by member, give it, even as 0.
         contact: "stop", the default; or "rest", so that members land on the floor by a term `lw.terms.BottomContact`.
 
     Methods:
@@ -47,7 +47,7 @@ class Floor(InFile, Event):
         SceneError: If a grid has no spacing, a flat floor has a spacing, or a number is invalid (see `Term`).
 
     Examples:
-        A slope that deepens by 5 m per 100 m to the north.
+        A floor whose depth increases by 5 m per 100 m to the north.
 
         >>> import lgvi_warp as lw
         >>> lw.Scene.named("remus_100", events=[lw.events.Floor(depth=40.0)]).parameters()["floor.depth"]
@@ -92,13 +92,13 @@ class Floor(InFile, Event):
             file: Path of the file, or an xarray Dataset.
             origin: Latitude and longitude [deg] of the origin of the inertial axes, (2,).
             region: Least and largest north and east to read, (2, 2) [m]; by default the whole file.
-            spacing: Distances between the nodes of the regular grid along north and east, (2,) [m]; by default as fine as the
-                file.
+            spacing: Distances between the nodes of the regular grid along north and east, (2,) [m]; by default the grid is
+                as fine as the file.
             variable: Name of the variable; by default the variable that is a floor depth or an elevation.
-            positive: "up" if the numbers are elevations, "down" if they are depths; by default the direction that the
-                variable states, and "up" for a GeoTIFF.
-            fill: Treatment of missing depths: "refuse", the default; "nearest"; or "zero", for land at the surface.
-            attributes: Missing or wrong attributes of a NetCDF file, for instance {"z.grid_mapping": "EPSG:3996"}.
+            positive: "up" if the numbers are elevations, "down" if they are depths. By default it is the direction that
+                the variable states, and "up" for a GeoTIFF.
+            fill: Treatment of missing depths: "refuse", the default; "nearest"; or "zero", for land at depth 0.
+            attributes: Values for missing or wrong attributes of a NetCDF file, such as {"z.grid_mapping": "EPSG:3996"}.
             clearance: Height above the floor at which members stop [m]; 0 if omitted.
             contact: "stop", the default, or "rest", as in the class.
             name: As in `Event`.

@@ -21,12 +21,12 @@ STARTS = ("zero", "stationary")
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class GaussMarkovCurrent(NoisyTerm):
-    """A uniform current u' = -u / time_constant + noise: a first-order Gauss-Markov process for each member.
+    """A uniform current u with u' = -u / time_constant + noise, a first-order Gauss-Markov process for each member.
 
     Args:
         standard_deviation: Standard deviation of u in the long run, (3,) [m/s], in inertial axes.
         time_constant: Correlation time [s], above 0.
-        start: "zero", the default, for u = 0 at t = 0; or "stationary", to draw u at t = 0 with the standard deviation.
+        start: "zero", the default, for u = 0 at t = 0; or "stationary", to draw u at t = 0 with `standard_deviation`.
 
     Raises:
         SceneError: If the time constant is not above 0, or a number is invalid (see `Term`).

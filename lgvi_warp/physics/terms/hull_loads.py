@@ -17,15 +17,15 @@ class HullLoads(StripTerm):
     """Loads on a slender hull in water that moves differently along it, as in waves (Lighthill 1960; Newman 1977, 7.4).
 
     The loads are computed by strips. The vehicle's added mass and the water velocity at its origin give the loads in water
-    that is uniform along the hull. At each station, this term adds the differences due to the local water motion in the
-    pressure of the undisturbed water and in the momentum of the water that the strip sets in motion. It also adds cross-flow
-    drag with the local flow, which includes the drag of `CrossFlow`: use only one of the two terms.
+    with a uniform motion along the hull. For each strip, this term adds the loads due to the difference of the local water
+    motion: by the pressure of the undisturbed water, and by the momentum of the water that the strip sets in motion. The
+    term also adds cross-flow drag with the local flow, which includes the drag of `CrossFlow`; do not use both.
 
     Args:
         stations: Positions along the body's x axis, (k,) [m], rising; two or more, from stern to bow.
         diameters: Breadth D of the hull across the flow, (k,) [m], linear between stations.
-        added_mass: Added mass across the hull per length, (k,) [kg/m], linear between stations; by default that of a
-            slender round hull, rho pi D^2 / 4 with the density rho of the water.
+        added_mass: Added mass across the hull per length, (k,) [kg/m], linear between stations; by default the added mass
+            of a slender round hull, rho pi D^2 / 4, where rho is the density of the water.
         drag_coefficient: Drag coefficient Cd, (k,), or one number for all stations; 0 by default.
 
     Raises:

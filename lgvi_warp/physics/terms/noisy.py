@@ -50,13 +50,13 @@ class NoisyTerm(Term):
     """Base class of terms with random numbers, which follow from seed, member, the term's name and the number of the draw.
 
     The author's device code must set NOISE = True, and gets the numbers of a step by `normals_over(view, p.key, stream)`.
-    This class adds the field `key` to the device struct. A subclass that defines `packed` must add its value by `noise_key`,
-    and device code that has its own `params` must declare it.
+    This class adds the field `key` to the device struct. A subclass that defines `packed` must add the value of `key` by
+    `noise_key`, and device code that has its own `params` must declare `key`.
 
     Args:
         noise_step: Time from one draw to the next [s]. The step of a run must be a whole multiple of `noise_step`; then
-            runs with different steps have the same noise path. None, the default, draws once a step, so that runs with
-            different steps have different paths.
+            runs with different steps have the same noise path. With None, the default, the term draws once a step, so that
+            runs with different steps have different paths.
 
     Methods:
         draws: Number of draws in one step of a run.

@@ -86,8 +86,8 @@ class QuadraticForm(Term):
     Args:
         products: Names of the coefficients, (k,): "X_vr" for v r, "Y_v|r|" for v |r|, "Y_|v|r" for |v| r, and "Z_w|vw|" for
             w (v^2 + w^2)^1/2.
-        values: The coefficients, (k,), in [kg/m, kg, kg m] for the product of two velocities, of a velocity and a rate, and
-            of two rates; for torques in [kg, kg m, kg m2].
+        values: The coefficients, (k,). The unit for forces is [kg/m] with two velocities, [kg] with a velocity and an angular
+            velocity, and [kg m] with two angular velocities; for torques it is [kg, kg m, kg m2].
 
     Methods:
         of: Term from coefficients by name.
@@ -158,7 +158,7 @@ class QuadraticForm(Term):
         """Build the term from the dimensionless coefficients of the standard equations of submarines.
 
         The names are those of Gertler and Hagen (1967) and Feldman (1979), with or without a prime: "X'uu", "Xvr'", "Z'w" for
-        u w, "Z'*" for u^2, "M'|w|" for u |w|. The cross-flow products v|v|, w|w|, |v|r and |w|q use the speed
+        u w, "Z'*" for u^2, "M'|w|" for u |w|. In the cross-flow products v|v|, w|w|, |v|r and |w|q, the modulus is
         (v^2 + w^2)^1/2, as published. The products v|r|, w|q| and ww are read as v |r|, w |q| and w^2, which is exact for a
         motion in one plane.
 

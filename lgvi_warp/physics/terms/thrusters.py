@@ -43,9 +43,9 @@ from lgvi_warp.physics.terms.thrust_curves import (
 class Thrusters(Commanded):
     """n thrusters, each with thrust = c+ f+(max(u - band, 0)) - c- f-(max(-u - band, 0)) along its direction (Fossen 2021, 9).
 
-    f(w) = polynomial_1 w + polynomial_2 w^2 + ..., by default w^2, or a table; f+ is f ahead and f- astern. u follows the
-    command after the lag, within the limit and the rate limit. A single number stands for n equal numbers. The user chooses
-    the unit of the command, such as 1, V or rad/s.
+    f(w) = polynomial_1 w + polynomial_2 w^2 + ..., by default w^2, or a table; f+ is f ahead, f- is f astern. band is the
+    dead band. u follows the command with the lag, within the limit and the rate limit. A single number stands for n equal
+    numbers. The user chooses the unit of the command, such as 1, V or rad/s.
 
     Beyond the dead band, w = sign(u) max(|u| - band, 0). Thrust falls by advance_loss |w| a and torque by torque_loss |w| a,
     where a is the speed of the thruster through the water along its direction (Fossen 2021, 9.1).
@@ -53,29 +53,29 @@ class Thrusters(Commanded):
     Args:
         position: Point at which each thrust acts, (n, 3) [m] from the body's origin.
         direction: Direction in which each thruster pushes the vehicle, (n, 3), of any length but 0.
-        coefficient: Coefficient c+ ahead, (n,) [N per unit of f]; 1 by default if a polynomial [N] is given.
+        coefficient: Coefficient c+ ahead, (n,) [N per unit of f]; 1 by default if a polynomial or a table [N] is given.
         coefficient_astern: Coefficient c- astern, (n,) [N per unit of f]; by default the coefficient ahead.
         polynomial: Polynomial f+ of all thrusters, (p,), from the first power up; w^2 by default.
         polynomial_astern: Polynomial f- of all thrusters, (q,), from the first power up; by default the polynomial ahead.
         table_commands: Commands of a table of thrust, (t,) [unit], rising; instead of polynomials. None by default.
         table_thrusts: Thrusts at these commands, (t, n) [N], or (t,) for n equal thrusters, linear between the commands and
             constant outside. They must rise and be 0 at the command 0; near this command several may be 0.
-        advance_loss: Coefficient of the loss of thrust ahead, (n,) [N per unit and m/s]; by default no loss.
+        advance_loss: Coefficient of the loss of thrust ahead, (n,) [N per unit and m/s]; by default there is no loss.
         advance_loss_astern: The same coefficient astern, (n,) [N per unit and m/s]; by default the coefficient ahead.
-        torque_coefficient: Torque on the vehicle about the direction per unit of w |w|, (n,) [N m per unit^2]. Its sign
-            depends on the propeller's sense of rotation. None by default.
+        torque_coefficient: Torque on the vehicle about the thruster's direction, divided by w |w|, (n,) [N m per unit^2]. Its
+            sign depends on the propeller's sense of rotation. By default there is no torque.
         torque_loss: Coefficient of the loss of torque, (n,) [N m per unit and m/s], with the sign of the torque; 0 by default.
-        power_commands: Commands of a table of power, (s,) [unit], rising; these are values of w, as in the table of thrust.
-            By default `table_commands`.
+        power_commands: Values of w of a table of power, (s,) [unit], rising, as in the table of thrust. By default they are
+            the `table_commands`.
         power: Electrical power at these commands, (s, n) [W], or (s,) for n equal thrusters, linear between the commands and
-            constant outside. None by default, for no power (see `EnergyUse`).
+            constant outside. By default no power is counted (see `EnergyUse`).
         shaft_speed: Angular speed of the propeller per unit of w, (n,) [rad/s per unit], instead of `power`. Power is then
             torque times shaft speed, divided by the efficiency. None by default.
         efficiency: Mechanical power of the shaft divided by electrical power, (n,); 1 by default.
         dead_band: Size of the command below which there is no thrust, (n,) [unit]; 0 by default.
         limit: Largest size of the command, (n,) [unit]; 1e6 by default.
         time_constant: Time constant of the first-order lag from the command to u, (n,) [s]; 0 by default, for no lag.
-        rate_limit: Largest rate of u, (n,) [unit/s]; by default no limit.
+        rate_limit: Largest rate of u, (n,) [unit/s]; by default there is no limit.
         command: Constant command, (n,) [unit]; 0 by default.
         times: Times of the schedule, (k,) [s], rising.
         command_schedule: Commands at these times, (k, n) [unit], linear between them; instead of `command`.
@@ -240,10 +240,10 @@ class Thrusters(Commanded):
         return {key: value for key, value in super().to_dict().items() if key not in left_out}
 
     def thrust(self, command: Any) -> np.ndarray:
-        """Steady thrust at given commands, within their limits, after the lag.
+        """Steady thrust at given commands, without speed through the water; commands beyond the limits are clipped.
 
         Args:
-            command: Commands (n,) or (k, n) [unit of the command].
+            command: Commands of the n thrusters, (n,) or k of each, (k, n) [unit of the command].
 
         Returns:
             Thrust (n,) or (k, n) [N] along each direction.
@@ -291,7 +291,7 @@ class Thrusters(Commanded):
         """The smallest commands that give requested thrusts.
 
         Args:
-            thrust: Thrusts (n,), or one number for all [N].
+            thrust: Thrusts of the n thrusters, (n,) [N], or one number for all.
 
         Returns:
             Commands (n,) [unit of the command]; if a curve does not reach the thrust, the command of its largest thrust.

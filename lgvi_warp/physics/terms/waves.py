@@ -235,7 +235,7 @@ class WaveTerm(Term):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Waves(WaveTerm, Harmonics):
-    """Linear waves whose angular frequencies in the water are sqrt(g k tanh(k depth)); g: gravity, k: wavenumber.
+    """Linear waves of angular frequency sqrt(g K tanh(K depth)) relative to the water; g: gravity, K: wavenumber.
 
     Args:
         amplitudes: Amplitudes of the surface, (k,) [m].
@@ -243,8 +243,8 @@ class Waves(WaveTerm, Harmonics):
         phases: Phases at t = 0 at the inertial origin, (k,) [rad]; 0 by default.
         headings_deg: Directions in which the waves travel, (k,) [deg] from north.
         depth: Depth of the sea [m], above 0; by default the water is deep.
-        periods_of: Frame of the periods in a uniform current: "ground", the default, a fixed point; or "water", a point that
-            drifts with the current.
+        periods_of: Frame in which the periods hold in a uniform current: "ground", the default, for a fixed point; or "water",
+            for a point that drifts with the current.
 
     Raises:
         SceneError: If a period is not above 0, or a number is invalid (see `Term`).

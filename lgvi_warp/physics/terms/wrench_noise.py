@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 class WrenchNoise(NoisyTerm):
     """White noise of force and torque along the body's axes, about the body's origin.
 
-    Over a time t the impulse has the variance S^2 t, where S is the strength.
+    Over a time t, each component of the impulse has the variance S^2 t, where S is its strength.
 
     Args:
         force: Strength of the force, (3,) [N s^1/2]; 0 by default.

@@ -25,14 +25,14 @@ Factors = tuple[tuple[str, tuple[int, ...]], ...]
 class Saltelli(Sampling):
     """Design for Sobol indices, as SALib.sample.sobol: groups of 2 d + 2 members, for d factors.
 
-    A factor is an entry that varies independently, or a joint distribution. A group consists of points A and B of one
-    Sobol sequence, A with one factor of B at a time, and B with one factor of A at a time. More groups can be added; a
-    power of two of them is balanced. Saltelli et al. (2010), Computer Physics Communications 181.
+    A factor is an entry that varies independently, or a joint distribution. A group has the points A and B of a Sobol
+    sequence, d copies of A with one factor from B, and d copies of B with one factor from A. Groups can be added; the
+    design is balanced if their number is a power of two. Saltelli et al. (2010), Computer Physics Communications 181.
 
     Args:
         second_order: True, the default, allows second-order indices; False gives groups of d + 2 members.
         replicates: Number R of independently scrambled sequences, which are used in turn, group by group; 1 by default.
-        groups: Name -> names of factors that form one factor; "current.velocity" names all entries; by default none.
+        groups: {name: list of factors that form one factor}; "current.velocity" means all its entries. None by default.
 
     Raises:
         SceneError: If a setting is wrong. The message lists every fault.
@@ -148,10 +148,10 @@ def _labels(space: Space, name: str) -> list[str]:
 
 @dataclass(frozen=True)
 class Morris(Sampling):
-    """Morris's screening design (SALib.sample.morris): paths of d + 1 members, d factors; each step changes one factor.
+    """Morris's screening design (SALib.sample.morris): paths of d + 1 members for d factors; a step changes one factor.
 
-    Each side of the unit cube is divided into equal parts, and members lie in the middle of parts, so that unbounded
-    distributions give finite values. More paths can be added. The design needs SALib (extra: uq). Morris (1991),
+    Each side of the unit cube is divided into equal parts. Each coordinate of a member is the middle of a part, so that
+    unbounded distributions give finite values. Paths can be added. The design needs SALib (extra: uq). Morris (1991),
     Technometrics 33; Campolongo, Cariboni & Saltelli (2007).
 
     Args:

@@ -26,9 +26,9 @@ class Grid(Sampling):
     random.
 
     Args:
-        axes: Name -> a list of values, of an entry such as "start.position[2]" or of the whole quantity; or name -> a
-            number of levels. The distribution of the name in `vary` is then divided into this number of equally
-            probable parts, and the medians of the parts are the values; for a vector, this holds for each entry.
+        axes: By name, a list of values or a number of levels. A name is an entry, such as "start.position[2]", or a
+            whole quantity. With a number of levels, the distribution of the name in `vary` is divided into this number
+            of equally probable parts, whose medians are the values. For a vector, each entry has this number of levels.
 
     Raises:
         SceneError: If an axis is neither a list of values nor a number of levels. The message lists every fault.

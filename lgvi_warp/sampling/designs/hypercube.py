@@ -20,7 +20,7 @@ LARGEST_GROUP = 2**20
 
 @dataclass(frozen=True)
 class LatinHypercube(Replicated):
-    """Latin hypercubes: in each group of members, every column has one member in each of `group` equal parts.
+    """Latin hypercubes: each column of the unit cube has `group` equal parts, with one member of a hypercube in each.
 
     Members are added group by group. Adding a name to `vary` does not change the values of the other names. McKay,
     Beckman & Conover (1979); scipy.stats.qmc.LatinHypercube.
@@ -28,7 +28,7 @@ class LatinHypercube(Replicated):
     Args:
         group: Number of members in a hypercube, 2 to 2^20; required. The number of members must be a multiple of
             `group` times `replicates`.
-        replicates: Number R of hypercubes that are filled together, by one member each in turn; 1 by default.
+        replicates: Number R of hypercubes that are filled together: member i goes to hypercube i mod R; 1 by default.
 
     Raises:
         SceneError: If a setting is wrong. The message lists every fault.

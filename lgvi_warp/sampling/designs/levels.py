@@ -21,13 +21,13 @@ from lgvi_warp.sampling.designs.space import Space
 class UnitCubePoints(Sampling):
     """Custom design: given points in the open unit cube, one for each member.
 
-    `ensemble.space` lists the columns of the cube: an entry that varies independently has one column with its name; a
+    `ensemble.space` lists the columns of the cube. An entry that varies independently has one column with its name; a
     joint distribution has several, "start.attitude 0" and so on. By default, the number of members is the number of
     points; with fewer members, the first points are used.
 
     Args:
-        points: Levels (n, dimensions) in (0, 1), n points with the columns in the order of the cube; or a data frame, a
-            mapping of columns, a structured array or an xarray Dataset with the names of the columns, in any order.
+        points: Coordinates (n, dimensions) in (0, 1) of n points, columns in the order of the cube. A data frame, a
+            mapping of columns, a structured array or an xarray Dataset may have the named columns in any order.
         names: Names of an array's columns, if they are not in the order of the cube.
 
     Raises:

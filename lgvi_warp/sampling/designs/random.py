@@ -17,7 +17,7 @@ from lgvi_warp.sampling.designs.space import Space
 class Random(Sampling):
     """Independent random numbers, which depend only on the seed, the member's index and the name of the quantity.
 
-    So adding members or varied names does not change the other numbers. `Random` is the default of `lw.Ensemble`. The
+    Adding members or varied names does not change the other numbers. `Random` is the default of `lw.Ensemble`. The
     error of a mean falls with the square root of the number of members; `LatinHypercube` and `Sobol` fill the cube more
     evenly. The generator is Philox (Salmon et al. 2011).
     """

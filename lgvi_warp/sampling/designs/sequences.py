@@ -23,7 +23,7 @@ SOBOL_BITS = 32
 class Sobol(Replicated):
     """Scrambled Sobol sequence (linear matrix scramble and digital shift, scipy.stats.qmc.Sobol): member i is point i.
 
-    More members can be added without changing the first ones. The design is balanced if their number is a power of two.
+    Adding members does not change the first ones. The design is balanced if the number of members is a power of two.
     Varying another name changes the whole sequence.
 
     Args:

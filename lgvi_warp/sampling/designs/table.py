@@ -37,9 +37,9 @@ class Table(Sampling):
     of lines; with fewer members, the first lines are used. Lines can be added at the end.
 
     Args:
-        file: Path of the file. Its columns are numbers of the scene or their entries, such as "vehicle.mass" or
-            "start.position[2]" (quote a name that contains a comma), separated by commas, semicolons or tabs. Empty
-            lines and lines that begin with # are skipped.
+        file: Path of the file. Its columns are named by numbers of the scene or by entries, such as "vehicle.mass" or
+            "start.position[2]"; quote a name that contains a comma. Commas, semicolons or tabs separate the columns.
+            Empty lines and lines that begin with # are skipped.
         values: Arrays (n,) or (n, *shape) by name, for n members, instead of a file; or a data frame, a structured
             array or an xarray Dataset with these names. A Dataset may be a posterior with chains and draws (ArviZ:
             idata.posterior); each draw is a member.

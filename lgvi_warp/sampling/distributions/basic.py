@@ -236,7 +236,7 @@ class LogNormal(Distribution):
     """Log-normal distribution: median * exp(sigma Z), Z standard normal. Values have the sign of the median.
 
     Args:
-        sigma: Standard deviation of the logarithm of the quantity.
+        sigma: Standard deviation of the logarithm of (value / median).
         median: Median; by default the scene's value.
     """
 
@@ -314,8 +314,8 @@ class Choice(Distribution):
     """Discrete distribution: one of k values, with probabilities proportional to weights.
 
     Args:
-        values: Numbers (k,): each entry of the quantity independently gets one of them. Or values (k, *shape): the
-            whole quantity gets one of them.
+        values: Numbers (k,), from which each entry of the quantity independently gets one; or values (k, *shape), from
+            which the whole quantity gets one.
         weights: Weights of the k values, (k,), at least 0; equal by default.
 
     Examples:

@@ -21,15 +21,15 @@ from lgvi_warp.sampling.distributions.named import as_distribution
 class Copula(JointLaw):
     """Joint distribution of d numbers, each with its own distribution, correlated by a Gaussian copula.
 
-    The numbers are the entries of a vector, or of several quantities, named "a, b" in `vary`.
+    The numbers are the entries of a vector, or of several quantities with the key "a, b" in `vary`.
 
     Args:
         correlation: Correlation (d, d) of the normal scores. If the distributions are not normal, the correlation of
-            the numbers is slightly closer to 0. From rank correlations compute 2 sin(pi s / 6) for Spearman's s, or
-            sin(pi t / 2) for Kendall's t.
+            the numbers is slightly closer to 0. A Spearman rank correlation s corresponds to 2 sin(pi s / 6), and a
+            Kendall rank correlation t to sin(pi t / 2).
         marginals: Distribution of each number: a list in the order of the names, or a mapping of names to
             distributions. A distribution may be one of lgvi_warp, a frozen distribution of scipy.stats, or an object
-            with quantiles.
+            with a quantile function `ppf` or `icdf`.
 
     Raises:
         SceneError: If the matrix is not a correlation matrix, or a marginal is not a distribution of a single number.

@@ -26,13 +26,13 @@ class KernelDensity(JointLaw):
     """Gaussian kernel density of draws, such as posterior draws: of one number, or of several numbers jointly.
 
     Its values are absolute: the scene's own value is not used. The density is the mean of normal distributions
-    (kernels) about the draws. For one number, the value rises with the level, so that Sobol points and other designs
-    remain evenly spread. For several numbers, one level selects a draw, and the other levels select the displacement
-    from this draw.
+    (kernels) about the draws. A level is a coordinate in the unit cube. For one number, the value rises with its level,
+    so that Sobol points and other designs remain evenly spread. For several numbers, one level selects a draw, and the
+    other levels select the displacement from this draw.
 
     Args:
-        draws: n draws, (n,) of one number or (n, d) of d numbers jointly: the entries of a vector, or of several
-            quantities, named "a, b" in `vary`.
+        draws: n draws, (n,) of one number or (n, d) of d numbers jointly. The d numbers are the entries of a vector, or
+            of several quantities with the key "a, b" in `vary`.
         bandwidth: Standard deviation of the kernels, in the unit of the quantity: one number, or (d,). By default
             Scott's rule: the covariance of the kernels is the covariance of the draws times n^(-2 / (d + 4)).
 

@@ -23,8 +23,8 @@ class Derived(JointLaw):
     functions: to use a run that was read from a file, give the ensemble again.
 
     Args:
-        functions: Name of a number -> function that returns the number of each member. The arguments of the function
-            are factors, by name; each is an array that can be multiplied by the scene's value of the number.
+        functions: By name of a number, a function that returns the number of n members, (n, *shape). Its arguments have
+            the names of factors; each is an array (n, 1, ...), to be multiplied by the scene's value of the number.
         factors: Distribution of each factor, for a single number. Where a distribution otherwise uses the scene's value
             (for example as its mean), it uses 1 here.
 

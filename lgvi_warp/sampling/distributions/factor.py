@@ -17,12 +17,12 @@ from lgvi_warp.sampling.distributions.named import as_distribution
 
 @dataclass(frozen=True, eq=False)
 class Factor(JointLaw):
-    """One random factor per member, which multiplies all entries of a number, or of several named "a, b" in `vary`.
+    """One random factor per member for all entries of a number, or of several numbers with the key "a, b" in `vary`.
 
     In a scene file: "drag_matrix.quadratic" = { factor = { uniform = { low = 0.8, high = 1.2 } } }.
 
     Args:
-        law: Distribution of the factor. Instead of the scene's value (for example as its mean), it uses 1.
+        law: Distribution of the factor. Where it would use the scene's value (for example as its mean), it uses 1.
 
     Raises:
         SceneError: If `law` is not a distribution of a single number.

@@ -151,9 +151,9 @@ class Levels(JointLaw):
 
 @dataclass(frozen=True)
 class CorrelatedNormal(JointLaw):
-    """Joint normal distribution of d entries of one quantity, or of several quantities, named "a, b" in `vary`.
+    """Joint normal distribution of d entries of one quantity, or of several quantities with the key "a, b" in `vary`.
 
-    Of a symmetric matrix, only the entries on and above the diagonal count; of a diagonal matrix, the diagonal entries.
+    d counts the entries on and above the diagonal of a symmetric matrix, or the diagonal entries of a diagonal matrix.
 
     Args:
         covariance: Covariance (d, d), in the units and order of the entries; it may be singular.
@@ -229,8 +229,8 @@ class AttitudeDistribution(JointLaw):
 class RotationNormal(AttitudeDistribution):
     """Concentrated normal distribution of an attitude, R = R0 exp(hat(v)); for "start.attitude".
 
-    R is the drawn attitude and R0 the scene's. v is a rotation vector in body axes, normal with mean 0. Barfoot &
-    Furgale (2014), Associating uncertainty with three-dimensional poses, do the same in other axes.
+    R is the drawn attitude, R0 the scene's attitude. v is a rotation vector in body axes, normal with mean 0. Barfoot &
+    Furgale (2014), Associating uncertainty with three-dimensional poses, use this distribution with v in other axes.
 
     Args:
         std: Standard deviation of v about each body axis, one number or (3,) [rad].
@@ -286,7 +286,7 @@ class PositiveDefinite(JointLaw):
     coordinates: Lin (2019), Riemannian geometry of symmetric positive definite matrices via Cholesky decomposition.
 
     Args:
-        sigma: Standard deviation of the logarithm, as above: one number, or one for each row (d,).
+        sigma: The number sigma of T, a standard deviation: one number, or one for each row, (d,).
         off_diagonal: Standard deviation of the entries of T below the diagonal; 0 by default.
     """
 
@@ -349,7 +349,7 @@ class PositiveDefinite(JointLaw):
 class PhysicalInertia(PositiveDefinite):
     """Distribution of physically possible inertias J: no principal inertia exceeds the sum of the other two.
 
-    The second moments of mass are S = tr(J) / 2 - J. `PositiveDefinite` draws S, and the inertia is J = tr(S) - S. A
+    The second moments of mass are S = tr(J) I / 2 - J (I: identity). `PositiveDefinite` draws S; J = tr(S) I - S. A
     mass distribution with inertia J exists if and only if S is positive definite (Wensing, Kim & Slotine 2018, Linear
     matrix inequalities for physically consistent inertial parameter identification). Use it for "vehicle.inertia",
     whose scene value must be physical, or for "vehicle.rigid_body_mass_matrix". For this matrix, S is taken about the

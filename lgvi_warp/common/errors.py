@@ -24,15 +24,15 @@ LONGEST_VALUE, LONGEST_NAME = 80, 200
 
 
 class SceneError(ValueError):
-    """A scene, an ensemble or a setting is refused; the message lists every fault and its remedy.
+    """Raised if a scene, an ensemble or a setting is refused; the message lists every fault and its remedy.
 
     Args:
-        faults: One text per fault. Of more than 20, the first 20 are kept.
-        more: Number of further faults without a text; default 0.
+        faults: One text per fault. If there are more than 20 texts, the first 20 are kept.
+        more: Number of further faults without a text; 0 by default.
 
     Attributes:
-        faults: The texts, each on one line.
-        more: Number of faults without a text.
+        faults: The texts that are kept, each on one line.
+        more: Number of faults without a text in `faults`.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -62,7 +62,7 @@ class SceneError(ValueError):
             prefix: Text to put before each fault.
 
         Returns:
-            A new error; this one is not changed.
+            A new error; this error is not changed.
         """
         return SceneError((f"{prefix}{fault}" for fault in self.faults), self.more)
 

@@ -19,7 +19,7 @@ ON_FAILURE = ("freeze", "raise", "substep")
 
 
 class Status(IntEnum):
-    """Outcome of one member: OK, the reason of its failure, or the event that stopped it.
+    """Outcome of one member: OK, the reason for its failure, or the event that stopped it.
 
     A failed member stays at its last good state, and other members are not affected. Codes from 16 on are events.
 
@@ -60,7 +60,7 @@ class Status(IntEnum):
 
     @property
     def text(self) -> str:
-        """Problem and remedy in words."""
+        """The outcome in words; for a failure, its problem and remedy."""
         return _TEXT[self]
 
 
@@ -120,16 +120,16 @@ class StatusArray(np.ndarray):
     def counts(self) -> dict[str, int]:
         """Count members by outcome.
 
-        Returns: Number of members by name of the status in lower case, in the order of the codes; only those that occur.
+        Returns: Number of members by name of the status in lower case, in the order of the codes, without zero counts.
         """
         values, numbers = np.unique(np.asarray(self), return_counts=True)
         return {Status(v).name.lower(): int(n) for v, n in zip(values, numbers, strict=True)}
 
 
 class Warnings(IntFlag):
-    """Warnings of a member, as bits: step, precision, iterations, numbers or water do not suit its motion.
+    """Warnings of a member, as bits. They say, for example, that its motion is too fast for the step or the method.
 
-    A warning does not stop a run. Of two warnings, the higher bit is the more serious.
+    A warning does not stop a run. A warning with a higher bit is more serious than one with a lower bit.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -160,7 +160,7 @@ class Warnings(IntFlag):
 
     @property
     def text(self) -> str:
-        """Observation and remedy, in one sentence for each warning bit."""
+        """What was observed, and the remedy, for each warning bit."""
         return "; ".join(_WARNING_TEXT[warning] for warning in Warnings if warning in self)
 
     @property
@@ -237,7 +237,7 @@ class WarningArray(np.ndarray):
     def counts(self) -> dict[str, int]:
         """Count members by warning.
 
-        Returns: Number of members by name of the warning in lower case, the most serious last; only those that occur. A
+        Returns: Number of members by name of the warning in lower case, the most serious last, without zero counts. A
             member counts once for each of its warnings.
         """
         bits = np.asarray(self)
@@ -256,7 +256,7 @@ class WarningArray(np.ndarray):
     def worst(self) -> np.ndarray:
         """Find the most serious warning of each member.
 
-        Returns: One bit of `Warnings` each, uint16, shape (n,); 0 for a member without a warning.
+        Returns: One bit of `Warnings` for each member, uint16, shape (n,); 0 for a member without a warning.
         """
         bits = np.asarray(self, dtype=np.uint16)
         highest = np.zeros_like(bits)

@@ -32,15 +32,15 @@ class NoiseDraws:
 
     Attributes:
         of: Key of the term or of the sensor.
-        stream: Noise that the draws drive: "force" or "torque" of white noise; "current", and "start" for its first value;
-            "noise", "drift", "dropout", "outlier" or "outlier_std" of a sensor; for a law that you write, "0" or "1", the
-            number of the stream.
+        stream: Name of the noise that the draws drive. White noise has "force" and "torque"; a random current has "current",
+            and "start" for its value at t = 0; a sensor has "noise", "drift", "dropout", "outlier" and "outlier_std". A law
+            that you write has "0" and "1", the numbers of its streams.
         first: Time of the first draw [s].
         spacing: Time from one draw to the next [s].
         count: Number of draws.
-        size: Count of numbers of a draw, 3 for axes x, y, z, or 1.
+        size: Count of normal numbers in one draw: 3 for axes x, y, z, or 1.
         column: First column of these draws in the array xi of all draws. Columns are ordered by draw, then by axis.
-        source: The stream of the counters that would otherwise give these numbers.
+        source: The stream of the counter-based generator that gives these numbers if the caller gives none.
     """
 
     of: str

@@ -63,13 +63,13 @@ class Vehicle(Summarized):
         center_of_gravity: Point at which the weight acts, (3,) [m] from the origin; by default it follows from the rigid
             body's mass matrix. 6x6 form.
         inertia_tolerance: Allowed violation of the triangle inequality of the principal inertias, as a fraction of the
-            largest one, in the 6x6 form. With 0, the default, a matrix that no rigid body can have is refused; importers set
+            largest inertia. 6x6 form. With 0, the default, a matrix that no rigid body can have is refused. Importers set
             the tolerance for published numbers.
-        warnings: Texts about unusual but allowed numbers, such as those of importers. The vehicle adds its own warnings; a
-            run shows all of them in its messages.
+        warnings: Texts about unusual but allowed numbers, such as the texts that importers write. The vehicle adds its own
+            warnings; a run shows all of them in its messages.
         shape: Drawn shape of the vehicle, a table with `length` and `diameter` [m] or with `mesh`, the path of a .glb file; by
             default a hull of the displaced volume. It has no effect on the motion.
-        title: Name of the vehicle in summaries and reports; by default the name in the package, if it has one.
+        title: Name of the vehicle in summaries and reports; by default its name in the package, if the package has it.
 
     Raises:
         SceneError: If a number is not finite, not positive, of the wrong shape, not symmetric or not positive definite.
@@ -228,8 +228,8 @@ class Vehicle(Summarized):
         """The vehicle as a table of a scene file.
 
         Returns:
-            Numbers by name, with diagonal 3x3 matrices given by their diagonal; the user's warnings, without those that the
-            vehicle itself adds; and the shape and the title, if given.
+            Numbers by name, with diagonal 3x3 matrices given by their diagonal; the user's warnings, without the warnings that
+            the vehicle adds; and the shape and the title, if given.
         """
         content = {}
         for name, value in self.parameters().items():

@@ -45,8 +45,8 @@ class Final(Summarized):
         seed: Seed of the ensemble.
         parameters: Parameters of the members by name, each with a first dimension of 1 or n.
         lanes: Arrays (n, rows) by name, in the form of the kernel: state, memory and outcome of each member.
-        settings: Settings of the run: method, step, number type and laws. A run with other settings continues from
-            `states` instead of `lanes`; so does every run if `settings` is empty, as after `changed`.
+        settings: Settings of the run: method, step, number type and laws. A run with other settings uses `states`
+            and the memory. So does every run if `settings` is empty, as after `changed`.
 
     Methods:
         part: Select members.

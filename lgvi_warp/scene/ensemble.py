@@ -53,9 +53,9 @@ class Ensemble(Summarized, Documented):
 
     Args:
         scene: The scene whose numbers vary.
-        members: Number of members, >= 1. None, the default: the number that the sampling fixes (a grid, a table), or 1.
+        members: Number of members, >= 1. By default the number that the sampling fixes, such as a grid or a table, or 1.
         seed: Seed of all random draws, a whole number >= 0; by default 0.
-        vary: {name: distribution}, of lgvi_warp or frozen distributions of scipy.stats; None, the default, if nothing varies.
+        vary: {name: distribution of lgvi_warp, or frozen one of scipy.stats}; None, the default, if no distribution is given.
         sampling: "random" (default), "sobol", "halton", "saltelli", lw.designs.LatinHypercube(...), lw.designs.Grid(...),
             lw.designs.Table(...) and others, or a table as in a scene file.
 
@@ -189,9 +189,9 @@ class Ensemble(Summarized, Documented):
             attitude: Rotation matrices (n, 3, 3), body to inertial.
             velocity: Velocities (n, 3) [m/s], body axes.
             angular_velocity: Angular velocities (n, 3) [rad/s], body axes.
-            parameters: {name: array of length n}, with names as in `vary`, also of single entries ("current.velocity[0]");
-                "vehicle.inertia" as (n, 3) or (n, 3, 3). A data frame, a structured array or an xarray Dataset with
-                these names is accepted, too. None if no parameter varies (default).
+            parameters: {name: array (n, *shape)}, with names as in `vary`, also of entries ("current.velocity[0]"). The shape
+                of "vehicle.inertia" is (n, 3) or (n, 3, 3). The argument may also be a data frame, a structured array or
+                an xarray Dataset with these names. None, the default, if no parameter varies.
 
         Returns:
             The ensemble of n members.
@@ -330,7 +330,7 @@ class Ensemble(Summarized, Documented):
             stop: Position after the last member.
 
         Returns:
-            {key of a variation: levels (stop - first, size)}, in the order of `space`.
+            {key of a variation: levels (stop - first, columns of this key in `space`)}, in the order of `space`.
         """
         return self._draws.levels_of(first, stop)
 
@@ -387,7 +387,7 @@ class Ensemble(Summarized, Documented):
         return ensemble
 
     def going_on(self, final: Final) -> Ensemble:
-        """Return these members, continued from the end of a run of them.
+        """Return these members, which continue from the end of their previous run.
 
         Args:
             final: Final states of that run, with the same number of members.
@@ -396,7 +396,7 @@ class Ensemble(Summarized, Documented):
             The ensemble, which starts at the time and in the states of `final`.
 
         Raises:
-            SceneError: If `final` is not the end of a run, or has another number of members.
+            SceneError: If `final` is not a `Final`, or has another number of members.
         """
         from lgvi_warp.sampling.final import Final
 
@@ -449,7 +449,7 @@ class Ensemble(Summarized, Documented):
 
     @property
     def varied_names(self) -> set[str]:
-        """Names of the numbers that differ between members: drawn, from columns, or explicit."""
+        """Names of the numbers that differ between members: drawn, given in a table's columns, or given as arrays."""
         varied = self._draws.varied_names
         return varied if self.copies is None else varied | self.copies.surveyed.varied_names
 
@@ -545,10 +545,10 @@ class Ensemble(Summarized, Documented):
         return ensemble
 
     def in_scene(self, scene: SceneLike, by_member: Sequence[str] = ()) -> Ensemble:
-        """Return the same members in another scene, with other terms, events or parts of the controller.
+        """Return the same members in another scene, which may have other terms, events or parts of the controller.
 
         Args:
-            scene: The scene. Varied numbers must keep their names, or not exist in it.
+            scene: The other scene. A varied number must have the same name in this scene, or not exist there.
             by_member: Names of further numbers that count as varied, since the caller sets them; none by default.
 
         Returns:
@@ -567,7 +567,7 @@ class Ensemble(Summarized, Documented):
 
         Args:
             seed: Whole number >= 0.
-            members: Number of members, the first ones of the sampling; None (default) for the members of this ensemble.
+            members: Number m of members, the first m of the sampling; by default the members are those of this ensemble.
 
         Returns:
             The ensemble.

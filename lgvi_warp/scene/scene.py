@@ -55,7 +55,7 @@ class Scene(Summarized):
         environment: Gravity and water, as lw.Environment(...); by default the standard values.
         terms: Further forces, such as lw.terms.Drag(...), or tables as in a scene file.
         start: The state at t = 0, as lw.Start(...); by default at rest at the origin.
-        controller: The controller, as lw.Controller(...) or a table as in a scene file; None, the default, for none.
+        controller: The controller, as lw.Controller(...) or a table as in a scene file; by default there is none.
         run: Settings of the run, the section [run] of a scene file.
         ensemble_settings: Members and their variations, the section [ensemble] of a scene file; None for one vehicle.
         events: Conditions that stop a member, such as lw.events.Surface(), or tables as in a scene file.
@@ -229,8 +229,8 @@ class Scene(Summarized):
         """Return the scene with other numbers.
 
         Args:
-            numbers: Values by name. Names are those of `parameters()`, of single entries ("drag.quadratic[0]"), of parts by
-                their place ("controller.sensors[0].noise"), "start.position" and other fields of the start,
+            numbers: Values by name. Names are those of `parameters()`, single entries ("drag.quadratic[0]"), numbers of a
+                part by its index ("controller.sensors[0].noise"), "start.position" and other fields of the start,
                 "controller.period", "run.step" and "run.duration". A new command or schedule replaces a constant command,
                 and a new attitude replaces an attitude in any form.
 

@@ -35,9 +35,9 @@ class Environment:
     Args:
         gravity: Acceleration of free fall [m/s2], >= 0; by default 9.80665 (standard gravity).
         water_density: Density of the water [kg/m3], > 0; by default 1025 (sea water).
-        origin: Latitude and longitude (2,) [deg, WGS 84] of the origin of the inertial axes, which point north, east and
-            down there; None, the default, if it is unknown. Longitudes may be -180 to 180 or 0 to 360.
-        start: Date and time at t = 0, such as "2026-06-01T00:00:00Z", in UTC unless it names a time zone. None, the
+        origin: Latitude and longitude (2,) [deg, WGS 84] of the origin of the inertial axes, where these point north, east
+            and down. None, the default, if it is unknown. A longitude may be given from -180 to 180 or from 0 to 360.
+        start: Date and time at t = 0, such as "2026-06-01T00:00:00Z", in UTC unless the text names a time zone. None, the
             default, if it is unknown.
 
     Attributes:
@@ -119,8 +119,8 @@ class Environment:
             position: Positions (..., 3) [m], inertial axes (north, east, down), such as `result.position`.
 
         Returns:
-            Latitude, longitude from -180 to 180 [deg] and depth [m], (..., 3). NaN for a position that is not finite, or
-            farther away than the other side of the Earth.
+            Latitude, longitude from -180 to 180 [deg] and depth [m], (..., 3). They are NaN if a position is not finite
+            or farther away than the opposite point of the Earth.
 
         Raises:
             SceneError: If there is no origin.
@@ -197,7 +197,7 @@ class Start:
         attitude: Rotation matrix (3, 3), body to inertial.
         rotation_vector: Axis times angle (3,) [rad], body to inertial.
         quaternion_wxyz: Quaternion (4,), scalar first, body to inertial, of any length but 0.
-        euler_deg: Roll, pitch, yaw (3,) [deg].
+        euler_deg: Roll, pitch, yaw (3,) [deg], in Fossen's zyx convention.
         velocity: Velocity of the body origin (3,) [m/s], body axes.
         velocity_inertial: Velocity of the body origin (3,) [m/s], inertial axes.
         angular_velocity: Angular velocity (3,) [rad/s], body axes.
@@ -246,7 +246,7 @@ class Start:
         """Return the start as the user gave it, completed with zeros.
 
         Returns:
-            Values by name: position (3,) [m], one attitude, one velocity (3,) [m/s] and angular_velocity (3,) [rad/s].
+            Values by name: position (3,) [m], attitude in one form, one velocity (3,) [m/s], angular_velocity (3,) [rad/s].
         """
         chosen = {name: getattr(self, name) for name in NAMES if getattr(self, name) is not None}
         if (place := chosen.pop("geodetic", None)) is not None:

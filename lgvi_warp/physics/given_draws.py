@@ -39,7 +39,7 @@ class NoiseDraws:
         spacing: Time from one draw to the next [s].
         count: Number of draws.
         size: Count of normal numbers in one draw: 3 for axes x, y, z, or 1.
-        column: First column of these draws in the array xi of all draws. Columns are ordered by draw, then by axis.
+        column: First column of these draws in the argument xi of a call. Columns are ordered by draw, then by axis.
         source: The stream of the counter-based generator that gives these numbers if the caller gives none.
     """
 

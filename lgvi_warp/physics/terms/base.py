@@ -684,7 +684,7 @@ class Term(Documented):
             names: Names of the fields to leave out.
 
         Returns:
-            The table, as of `to_dict`.
+            The table, as `to_dict` returns it, without these fields.
         """
         content: dict[str, Any] = {"type": self.type} | ({"name": self.name} if self.name else {})
         for item in dataclasses.fields(self):

@@ -96,7 +96,7 @@ class Drag(Term):
             context: The scene's parameters, the frame and the run.
 
         Returns:
-            For each axis the column of the inverse inertia, divided by its diagonal element L, and the coefficients times L.
+            For each axis, the column of the inverse inertia divided by its diagonal element L, and the coefficients times L.
         """
         frame = context.frame
         scale = frame.J.max(axis=1)

@@ -36,7 +36,7 @@ class Floor(InFile, Event):
         origin: Position of the grid's first node, (2,) [m]: north and east; zeros by default.
         spacing: Distance between nodes along north and east, (2,) [m]; required with a grid.
         clearance: Height above the floor at which members stop [m]; 0 if omitted. To vary it by member, give it, even as 0.
-        contact: "stop", the default; or "rest", so that members land on the floor by a term `lw.terms.BottomContact`.
+        contact: "stop", the default, stops members at the floor; "rest" lets them land on it (`lw.terms.BottomContact`).
 
     Methods:
         from_file: Floor from a chart, in a raster or a data set.
@@ -209,7 +209,7 @@ class Floor(InFile, Event):
             north: North coordinates of the points [m], of any shape.
             east: East coordinates of the points [m], of the same shape.
             numbers: The floor's numbers by field for n members, each of shape (1 or n, ...); the last dimension of the points
-                is then n. None, the default, for the floor's own numbers.
+                is then n. By default the floor's own numbers are used.
 
         Returns:
             Depths [m], of the shape of the points.

@@ -84,9 +84,9 @@ class QuadraticForm(Term):
     the law then accelerates the vehicle.
 
     Args:
-        products: Names of the coefficients, (k,): "X_vr" for v r, "Y_v|r|" for v |r|, "Y_|v|r" for |v| r, and "Z_w|vw|" for
+        products: Names of the coefficients, (m,): "X_vr" for v r, "Y_v|r|" for v |r|, "Y_|v|r" for |v| r, and "Z_w|vw|" for
             w (v^2 + w^2)^1/2.
-        values: The coefficients, (k,). The unit for forces is [kg/m] with two velocities, [kg] with a velocity and an angular
+        values: The coefficients, (m,). The unit for forces is [kg/m] with two velocities, [kg] with a velocity and an angular
             velocity, and [kg m] with two angular velocities; for torques it is [kg, kg m, kg m2].
 
     Methods:

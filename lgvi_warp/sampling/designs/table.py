@@ -47,9 +47,9 @@ class Table(Sampling):
         columns: Names of the columns to use; all by default.
         ignore: Names of the columns to leave out, such as an id; none by default.
         weights: Statistical weights of the members: the name of a column, or numbers (n,) of at least 0, on any scale.
-            The members then represent another distribution than the one from which they were drawn. A member's weight
-            is the ratio of the two densities (importance sampling), or the weight of a posterior draw. By default all
-            weights are equal.
+            The members then represent a target distribution that differs from the one of the draws. A member's weight
+            is the target's density divided by the density of the draws (importance sampling), or the weight of a
+            posterior draw. By default all weights are equal.
 
     Raises:
         SceneError: If the file cannot be read, or a cell has no number. The message lists every fault.

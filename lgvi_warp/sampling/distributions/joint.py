@@ -282,7 +282,7 @@ class PositiveDefinite(JointLaw):
 
     A is the drawn matrix. T is lower triangular, with exp(sigma z / 2) on the diagonal and off_diagonal z below; each z
     is standard normal. So for a diagonal matrix, the logarithm of each diagonal entry has standard deviation sigma, and
-    its median is the scene's value. Zeros of the scene, such as an absent added mass, remain zero. Log-Cholesky
+    the entry's median is the scene's value. Zeros of the scene, such as an absent added mass, remain zero. Log-Cholesky
     coordinates: Lin (2019), Riemannian geometry of symmetric positive definite matrices via Cholesky decomposition.
 
     Args:

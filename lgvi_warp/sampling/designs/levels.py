@@ -26,7 +26,7 @@ class UnitCubePoints(Sampling):
     points; with fewer members, the first points are used.
 
     Args:
-        points: Coordinates (n, dimensions) in (0, 1) of n points, columns in the order of the cube. A data frame, a
+        points: Coordinates (n, dimensions) in (0, 1) of n points, with columns in the order of the cube. A data frame, a
             mapping of columns, a structured array or an xarray Dataset may have the named columns in any order.
         names: Names of an array's columns, if they are not in the order of the cube.
 

@@ -177,8 +177,8 @@ class Method(Summarized, Documented):
         beta: Weight of the old configuration in the average of nonconservative torques, equation (16); as `alpha`.
         rtol: Relative tolerance of the step control of rk5, rk5_ck and rk8. By default (None) the step is fixed. The
             root mean square of (estimated error of y_i) / (atol + rtol |y_i|) stays below 1. The y_i are position,
-            attitude, and momenta divided by the largest inertia. The vehicle with the largest error in a packet (vehicles
-            that advance together) sets their step. `h` is the longest step; samples, events and statuses hold at multiples of `h`.
+            attitude, and momenta divided by the largest inertia. The largest error in a packet (vehicles that are
+            advanced together) sets its step. `h` is the longest step; samples, events and statuses are at multiples of `h`.
         atol: Absolute tolerance of the step control; give both tolerances or none.
         reason: Reason for an automatic choice of the method, for the summary and the provenance; "" by default.
 

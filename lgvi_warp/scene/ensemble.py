@@ -53,7 +53,7 @@ class Ensemble(Summarized, Documented):
 
     Args:
         scene: The scene whose numbers vary.
-        members: Number of members, >= 1. By default the number that the sampling fixes, such as a grid or a table, or 1.
+        members: Number of members, >= 1. By default it is the number that the sampling fixes, as a grid does, or else 1.
         seed: Seed of all random draws, a whole number >= 0; by default 0.
         vary: {name: distribution of lgvi_warp, or frozen one of scipy.stats}; None, the default, if no distribution is given.
         sampling: "random" (default), "sobol", "halton", "saltelli", lw.designs.LatinHypercube(...), lw.designs.Grid(...),

@@ -266,7 +266,7 @@ def from_fossen(
 
     Args:
         coefficients: Values by name: X_udot ... N_rdot [kg, kg m, kg m2], X_u ... N_r [N s/m, N m s],
-            X_uu ... N_rr [N s2/m2, N m s2], in any usual spelling. Diagonal ones, such as X_u and K_p, are negative.
+            X_uu ... N_rr [N s2/m2, N m s2], in any usual spelling. Diagonal terms, such as X_u and K_p, are negative.
         mass: Mass [kg].
         inertia: Inertia (3,) or (3, 3) [kg m2], about the point that `inertia_about` names.
         center_of_gravity: Position (3,) [m] from the body origin; by default the origin.

@@ -468,7 +468,7 @@ class Term(Documented):
         return {}
 
     def present(self, numbers: Numbers) -> bool:
-        """Whether the term acts on any member: by default, if it has no `strengths` or one of these is not 0.
+        """Whether the term acts on any member. By default it does if it has no `strengths`, or if one of them is not 0.
 
         Args:
             numbers: The term's numbers by field, each of shape (n, ...).

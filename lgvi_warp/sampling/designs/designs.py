@@ -30,7 +30,7 @@ class Saltelli(Sampling):
     design is balanced if their number is a power of two. Saltelli et al. (2010), Computer Physics Communications 181.
 
     Args:
-        second_order: True, the default, allows second-order indices; False leaves out the copies of B (groups of d + 2 members).
+        second_order: True, the default, allows second-order indices; False leaves out the copies of B (d + 2 members).
         replicates: Number R of independently scrambled sequences, which are used in turn, group by group; 1 by default.
         groups: {name: list of factors that form one factor}; "current.velocity" means all its entries. None by default.
 

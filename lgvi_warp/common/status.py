@@ -127,7 +127,7 @@ class StatusArray(np.ndarray):
 
 
 class Warnings(IntFlag):
-    """Warnings of a member, as bits. They say, for example, that its motion is too fast for the step or the method.
+    """Warnings of a member, as bits. A bit says, for example, that the motion is too fast for the step or the method.
 
     A warning does not stop a run. A warning with a higher bit is more serious than one with a lower bit.
 

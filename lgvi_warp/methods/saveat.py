@@ -23,7 +23,7 @@ class SaveAt:
     """Samples that a run keeps. The start and the end are always kept.
 
     Args:
-        every: Interval between samples [s], counted from the start. By default only the start and the end are kept.
+        every: Interval between samples [s], counted from the start. Without `every` and `at`, only start and end are kept.
         at: Increasing times of samples [s], >= 0; None by default. Give `every` or `at`, not both. Each time must be a
             whole number of steps, to within 1e-9 of a step, or to the precision of float32 for times in float32.
         fields: Any of "position", "attitude", "velocity", "angular_velocity"; by default all four. An omitted field

@@ -159,7 +159,7 @@ class Battery(Event):
 class MissionDone(Event):
     """Stop a member at the tick at which it has reached its last waypoint and completed the circles requested there.
 
-    With `at_end = "loiter"`, if the last point has no turns or time, the mission is done when the circle begins. If the
+    If `at_end` is "loiter" and the last point has no turns or time, the mission is done when the circle begins. If the
     mission is done at the last tick of a run, the member ends as "ok".
 
     Args:

@@ -24,7 +24,7 @@ class Derived(JointLaw):
 
     Args:
         functions: By name of a number, a function that returns the number of n members, (n, *shape). Its arguments have
-            the names of factors; each is an array (n, 1, ...), to be multiplied by the scene's value of the number.
+            the names of factors; each is an array (n, 1, ...) that can be multiplied by the scene's value of the number.
         factors: Distribution of each factor, for a single number. Where a distribution otherwise uses the scene's value
             (for example as its mean), it uses 1 here.
 

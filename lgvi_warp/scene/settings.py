@@ -156,7 +156,7 @@ class EnsembleSettings:
     """The section [ensemble] of a scene file.
 
     Args:
-        members: Number of members, from 1 to 2**31; None (default) for the number that the sampling fixes, or one group.
+        members: Number of members, from 1 to 2**31; by default the number is chosen as in Ensemble.
         seed: Whole number from 0; by default 0.
         vary: {name of a number: distribution}, as in Ensemble; by default nothing varies.
         sampling: Design of the points: a name, an object such as lw.designs.Grid(...), or a table; by default "random".

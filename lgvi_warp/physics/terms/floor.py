@@ -35,7 +35,7 @@ class Floor(InFile, Event):
         depth: Depth of the floor [m]; or an array of depths of shape (nodes along north, nodes along east) [m].
         origin: Position of the grid's first node, (2,) [m]: north and east; zeros by default.
         spacing: Distance between nodes along north and east, (2,) [m]; required with a grid.
-        clearance: Height above the floor at which members stop [m]; 0 if omitted. To vary it by member, give a value, such as 0.0.
+        clearance: Height above the floor at which members stop [m]; 0 if omitted. To vary it by member, give it, even as 0.0.
         contact: "stop", the default, stops members at the floor; "rest" lets them land on it (`lw.terms.BottomContact`).
 
     Methods:

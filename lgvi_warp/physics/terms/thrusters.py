@@ -64,7 +64,7 @@ class Thrusters(Commanded):
         advance_loss_astern: The same coefficient astern, (n,) [N per unit and m/s]; by default the coefficient ahead.
         torque_coefficient: Torque on the vehicle about the thruster's direction, divided by w |w|, (n,) [N m per unit^2]. Its
             sign depends on the propeller's sense of rotation. By default there is no torque.
-        torque_loss: Coefficient of the loss of torque, (n,) [N m per unit and m/s], with the sign of the torque; 0 by default.
+        torque_loss: Coefficient of the loss of torque, (n,) [N m per unit and m/s], signed as `torque_coefficient`; 0 by default.
         power_commands: Values of w of a table of power, (s,) [unit], rising, as in the table of thrust. By default they are
             the `table_commands`.
         power: Electrical power at these commands, (s, n) [W], or (s,) for n equal thrusters, linear between the commands and
@@ -74,7 +74,7 @@ class Thrusters(Commanded):
         efficiency: Mechanical power of the shaft divided by electrical power, (n,); 1 by default.
         dead_band: Size of the command below which there is no thrust, (n,) [unit]; 0 by default.
         limit: Largest size of the command, (n,) [unit]; 1e6 by default.
-        time_constant: Time constant of the first-order lag from the command to u, (n,) [s]; 0 by default, for no lag.
+        time_constant: Time constant of the first-order lag from the command to u, (n,) [s]; 0 by default (no lag).
         rate_limit: Largest rate of u, (n,) [unit/s]; by default there is no limit.
         command: Constant command, (n,) [unit]; 0 by default.
         times: Times of the schedule, (k,) [s], rising.

@@ -53,9 +53,9 @@ class Ensemble(Summarized, Documented):
 
     Args:
         scene: The scene whose numbers vary.
-        members: Number of members, >= 1. By default it is the number in a grid or a table, or else the least that the sampling allows.
+        members: Number of members, >= 1. The default is the number in a grid or a table, or else one group of the sampling.
         seed: Seed of all random draws, a whole number >= 0; by default 0.
-        vary: {name: distribution}; a distribution is one of lgvi_warp or a frozen one of scipy.stats. By default no name varies.
+        vary: {name: distribution}, with distributions of lgvi_warp or frozen ones of scipy.stats. By default nothing varies.
         sampling: "random" (default), "sobol", "halton", "saltelli", lw.designs.LatinHypercube(...), lw.designs.Grid(...),
             lw.designs.Table(...) and others, or a table as in a scene file.
 

@@ -64,7 +64,7 @@ class Thrusters(Commanded):
         advance_loss_astern: The same coefficient astern, (n,) [N per unit and m/s]; by default the coefficient ahead.
         torque_coefficient: Torque on the vehicle about the thruster's direction, divided by w |w|, (n,) [N m per unit^2]. Its
             sign depends on the propeller's sense of rotation. By default there is no torque.
-        torque_loss: Coefficient of the loss of torque, (n,) [N m per unit and m/s], signed as `torque_coefficient`; 0 by default.
+        torque_loss: Coefficient of the loss of torque, (n,) [N m per unit and m/s]; 0 by default. It has the torque's sign.
         power_commands: Values of w of a table of power, (s,) [unit], rising, as in the table of thrust. By default they are
             the `table_commands`.
         power: Electrical power at these commands, (s, n) [W], or (s,) for n equal thrusters, linear between the commands and

@@ -25,7 +25,7 @@ Factors = tuple[tuple[str, tuple[int, ...]], ...]
 class Saltelli(Sampling):
     """Design for Sobol indices, as SALib.sample.sobol: groups of 2 d + 2 members, for d factors.
 
-    A factor is an entry that varies independently, or a joint distribution. A group has the points A and B of a Sobol
+    A factor is an entry that varies independently, or a joint distribution. A group has points A and B of a Sobol
     sequence, d copies of A with one factor from B, and d copies of B with one factor from A. Groups can be added; the
     design is balanced if their number is a power of two. Saltelli et al. (2010), Computer Physics Communications 181.
 

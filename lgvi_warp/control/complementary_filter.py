@@ -12,7 +12,7 @@ from lgvi_warp.physics.terms.base import number
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ComplementaryFilter(MeasuringPart):
-    """Complementary filter: fuse measured rates (high frequencies) and measured attitude (low frequencies) to an attitude.
+    """Complementary filter: an attitude from measured rates (high frequencies) and measured attitude (low frequencies).
 
     At each tick, first R <- R exp(T (Omega_old + Omega) / 2): R is the estimate, T the period, Omega_old and Omega are the
     measured rates at the previous and at this tick. Then R <- R exp((1 - exp(-T / time_constant)) e), where e is the

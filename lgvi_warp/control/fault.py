@@ -50,7 +50,7 @@ class Fault(Sending):
     | freeze | the last command or reading repeats |
     | slow | x follows with a first-order lag, starting from the last command or reading |
     | delay | x arrives later; until the first delayed x arrives, the last command or reading repeats |
-    | intermittent | while on: a command changes as with "gain"; a sensor's last reading repeats; an estimator gets none |
+    | intermittent | while on: a command changes as with "gain"; the last reading repeats; estimators get no reading |
 
     The fault begins at the first tick at or after `time` and ends at the first tick at or after `until`. A sensor's fault
     acts directly after the sensor, on the reading that has arrived. If an estimator takes the readings, the fault

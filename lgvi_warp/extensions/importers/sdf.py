@@ -66,7 +66,7 @@ def from_sdf(
             its <uri> or the last part of its <uri>. By default none; a file named inside `source` is never opened.
 
     Returns:
-        The tables "vehicle", "environment" and "terms" of a scene file. Without displacing shapes, the vehicle is neutral.
+        The tables "vehicle", "environment" and "terms" of a scene file. Without any volume, the vehicle is neutral.
 
     Raises:
         SceneError: If the file is invalid: a mass is not a number, a mesh has no `volume`, the file is a template, etc. The

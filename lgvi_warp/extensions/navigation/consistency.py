@@ -24,7 +24,7 @@ class TimeAverage(NamedTuple):
         mean: Mean over all members and times; NaN if there are no values.
         degrees: Degrees of freedom of one value, equal to the mean that a consistent filter has.
         effective: Effective sample size, the number of independent values with the same information.
-        p: Probability that the mean of a consistent filter is at least as far from `degrees` (two-sided); NaN without mean.
+        p: Probability that a consistent filter's mean is at least as far from `degrees` (two-sided); NaN without mean.
     """
 
     mean: float

@@ -28,7 +28,7 @@ class OfFilter(Metric):
 class NEES(OfFilter):
     """Mean over a member's ticks of e^T P^-1 e, the filter's normalised squared error; then statistics over members.
 
-    e is the error and P the covariance of its 15 states. The expected value is 15 for a consistent filter. Errors at two
+    e is the error and P the covariance of its 15 states. A consistent filter has the expected value 15. Errors at two
     ticks are not independent, so use `lw.metrics.consistency` for a test over members. The filter needs report=True.
 
     Args:

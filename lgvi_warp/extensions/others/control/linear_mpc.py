@@ -63,9 +63,9 @@ class LinearMPC(ControlLaw):
     Otherwise an interior-point method (Nocedal & Wright 2006, algorithm 16.4) solves the constrained problem. Its demand is
     accurate to 1e-6 of the limit, in float32 to 1e-2. The run's messages report ticks at which the method had not converged.
 
-    d is the estimated disturbance: the measured x minus its prediction, filtered over `disturbance_time`. For the prediction,
-    the last reference is continued at its rates. x_s and u_s are the steady state under d in which the `tracked` errors are
-    0, so constant disturbances cause no error in these states. The prediction uses only the delivered demand.
+    d is the estimated disturbance: measured x minus predicted x, low-pass filtered with `disturbance_time`. For the
+    prediction, the last reference is continued at its rates. x_s and u_s are the steady state under d in which the
+    `tracked` errors are 0, so constant disturbances cause no error in them. Predictions use the delivered demand.
     `lw.linear.mpc` creates the law from a linear model.
 
     Args:

@@ -19,22 +19,22 @@ from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, 
 class Altimeter(Sensor):
     """A sensor of the range to the scene's floor along a beam fixed to the body, with the same errors as a `Sensor`.
 
-    A reading is 0 on the floor or below it, and `most` if no floor is within range. Readings are computed from the true
-    position and attitude, not from the readings of other sensors.
+    The range is 0 if the beam begins on or below the floor, and `most` if the beam ends above it. It is computed from
+    the true position and attitude, not from the readings of other sensors. Readings are limited to 0 to `most`.
 
     Args:
         direction: Direction of the beam in body axes, (3,) of any length; (0, 0, 1) by default, down.
         point: Point at which the beam begins, (3,) [m] in body axes; zeros by default.
         most: Largest range of the beam [m]; 100 by default.
         floor: Name of the floor; "", the default, stands for the only floor of the scene.
-        noise: Standard deviation of each reading [m]; 0 by default.
+        noise: Standard deviation of the noise of each reading [m]; 0 by default.
         bias: Constant error added to each reading [m]; 0 by default.
         drift: Standard deviation of the random walk after 1 s [m / s^1/2]; 0 by default.
         quantum: Readings are rounded to whole multiples of this length [m]; 0 by default, for no rounding.
         every: Number of ticks from one new reading to the next, a whole number; 1 by default.
         latency: Number of ticks after which a reading arrives, a whole number; 0 by default.
         dropout: Probability that a reading is lost, in which case the last reading is kept; 0 by default.
-        burst: Mean number of ticks in a row without a reading; by default losses are independent.
+        burst: Mean length of a run of lost readings [ticks]; by default losses are independent.
         outlier: Probability that a reading is an outlier; by default there are no outliers.
         outlier_std: Standard deviation of the error that an outlier adds to the reading [m].
 

@@ -26,8 +26,8 @@ class Altitude(Guidance):
 
     With an altimeter, the floor's depth is the depth of the point that the beam hits. It is computed from the measured
     depth, the measured attitude and the reading. With a beam that points ahead, the vehicle climbs before a slope. Without
-    an echo the vehicle goes deeper until the beam has an echo. With `source="chart"`, the floor's depth is the smaller of
-    the depths of the scene's floor at the measured position and at the distance `look_ahead` ahead.
+    an echo the vehicle goes deeper until the beam has an echo. With `source="chart"`, the floor's depth is read at two
+    points: the measured position, and the point `look_ahead` ahead of it. The smaller of the two depths is used.
 
     Args:
         altitude: Wanted altitude [m], above 0.

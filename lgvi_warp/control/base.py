@@ -563,7 +563,7 @@ class Allocation(Part):
         actuator: The term that takes the commands.
 
     Methods:
-        reach: The wrench of each channel.
+        reach: Wrenches (6, channels) that the channels produce; only the directions of the wrenches count.
     """
 
     section: ClassVar[str] = "allocation"

@@ -24,12 +24,12 @@ class BoundedLeastSquares(EffortAllocation):
 
     The error is the sum over X, Y, Z, K, M, N of (priority times (wrench minus demand))^2, with moments divided by the mean
     lever arm of the channels. If the efforts of least error without limits are within the limits, they are used. They equal
-    the efforts of `PseudoInverse` if the channels can produce every component independently. Otherwise an active-set method
-    finds the efforts of least error, to round-off. Channels that are known to be lost get no effort, whatever their number.
+    those of `PseudoInverse` if the channels can produce every component independently. Otherwise an active-set method
+    finds the efforts of least error, to round-off. Channels that are known to be lost, however many, get no effort.
 
     Args:
         to: Key of the term that takes the commands.
-        weights: Cost of each effort, (channels,), above 0; 1 by default.
+        weights: Cost of each effort (defined in `PseudoInverse`), (channels,), above 0; 1 by default.
         speed: Forward speed [m/s] at which the effect of fins is evaluated; 1 by default. "measured" uses, at each tick,
             the measured forward speed through the water, but at least `least_speed`.
         least_speed: Least speed [m/s] at which the effect of fins is evaluated if `speed` is "measured".

@@ -30,10 +30,10 @@ class Callback(ControlLaw):
     Args:
         function: The function. It must be picklable if other processes run it.
         to: Key of a term, or a list of keys. The function then returns the commands of all their channels, side by side,
-            (m, channels), and no law or allocation acts on these terms. None, the default: the function returns demands.
+            (m, channels), and no law or allocation acts on these terms. By default, the function returns demands.
         version: Text or number that identifies the function in sweeps and stores; change it whenever the function changes.
-            With None, the default, its code identifies the function. Give a version if the function reads files or holds
-            objects that cannot be compared.
+            With None, the default, the function is identified by its code. Give a version if the function reads files
+            or holds objects that cannot be compared.
 
     Examples:
         >>> import lgvi_warp as lw

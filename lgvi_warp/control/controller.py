@@ -42,16 +42,16 @@ ACTUATOR = 'give the vehicle a term that does, [[terms]] type = "thrusters", "co
 class Controller(Documented):
     """A controller that computes commands once per period, at a tick, and holds them until the next tick.
 
-    Each list holds parts such as lw.control.HeadingPID(...), or tables as in a scene file.
+    The lists below hold parts such as lw.control.HeadingPID(...), or tables as in a scene file.
 
     Args:
         period: Time between two ticks [s], a whole number of steps.
-        delay: Time from a tick until its commands take effect [s], a whole number of steps; may vary by member. 0 by default.
+        delay: Time from a tick to the effect of its commands [s], in whole steps; may vary by member. 0 by default.
         sensors: Sensors and estimators, in the order in which they act. Without sensors, the true motion is measured.
         guidance: Parts that set the wanted motion, in the order in which they act.
         laws: Parts that demand a wrench; their demands are added.
         allocation: Parts that turn the demand into commands, in this order. Each part receives the demand that the parts
-            before it did not deliver. By default the pseudo-inverse, if exactly one term takes commands.
+            before it did not deliver. If exactly one term takes commands, the pseudo-inverse is the default.
         faults: Faults of actuators and of sensors.
 
     Methods:
@@ -253,13 +253,13 @@ class Controller(Documented):
 
     @property
     def handed_rows(self) -> dict[str, int]:
-        """Number of rows that each sensor passes to an estimator, by its key."""
+        """Number of memory rows that each sensor passes to an estimator, by the sensor's key."""
         taken = {key for part in self.sensors for key in part.uses.values()}
         return {part.key: part.handed_rows for part in self.sensors if part.key in taken}
 
     @property
     def belief_rows(self) -> int:
-        """Number of rows of the estimator's own state."""
+        """Number of memory rows of the estimator's own state."""
         return sum(part.belief_rows for part in self.sensors)
 
     @property
@@ -292,7 +292,7 @@ class Controller(Documented):
         )
 
     def unread(self, terms: Sequence[Term]) -> tuple[tuple[Part, str], ...]:
-        """Pairs (guidance, quantity), one for each wanted quantity that no law reads, nor an equivalent quantity.
+        """Pairs (guidance, quantity), one for each wanted quantity if no law reads this or an equivalent quantity.
 
         A speed that guidance requires is left out if no actuator can produce a forward force and every term gets commands.
 

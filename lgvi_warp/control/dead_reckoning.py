@@ -29,7 +29,7 @@ class DeadReckoning(MeasuringPart):
             through the water, so that the estimate drifts in a current.
         depth: "reckoned", the default, computes the depth from the velocity, like north and east; "measured" uses the
             measured depth.
-        start_error: Error added to the position of the first tick, (3,) [m], inertial axes; 0 by default.
+        start_error: Error added to the position at the first tick, (3,) [m], inertial axes; 0 by default.
 
     Raises:
         SceneError: If an option has an unknown value, or a number is invalid (see `Term`).

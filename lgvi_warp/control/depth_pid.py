@@ -29,8 +29,8 @@ class DepthPID(IntegralLaw):
         k_heave: Gain of the heave velocity w [N s]; 0 by default.
         integral_limit: Largest sizes of I and of I_theta, (2,) [m s, rad s]; 1e6 by default.
         anti_windup: "conditional", the default, stops I_theta while the actuators do not deliver the whole moment M and
-            further integration would increase the undelivered part. It stops I while the wanted pitch is at its limit
-            and further integration would move it further beyond. "none" never stops an integrator.
+            further integration would increase the undelivered part. It stops I while -(kp e + ki I) is
+            beyond the pitch limit and further integration would increase the excess. "none" never stops an integrator.
 
     Examples:
         >>> import lgvi_warp as lw

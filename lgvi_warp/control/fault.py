@@ -50,25 +50,25 @@ class Fault(Sending):
     | freeze | the last command or reading repeats |
     | slow | x follows with a first-order lag, starting from the last command or reading |
     | delay | x arrives later; until the first delayed x arrives, the last command or reading repeats |
-    | intermittent | while on, a command changes as with "gain", the last reading repeats, an estimator gets no reading |
+    | intermittent | while on: a command changes as with "gain"; the last reading repeats; estimators get no reading |
 
     The fault begins at the first tick at or after `time` and ends at the first tick at or after `until`. A sensor's fault
-    acts directly after the sensor, on the reading that has arrived. If an estimator takes the readings, the fault acts on
-    these; the kinds "stuck", "freeze", "slow" and "delay" store only new readings. Laws are not informed of a fault, and
-    their integrals continue.
+    acts directly after the sensor, on the reading that has arrived. If an estimator takes the readings, the fault
+    changes what it receives, and the kinds "stuck", "freeze", "slow" and "delay" use only new readings. Laws are not
+    informed of a fault, and their integrals continue.
 
     Args:
-        of: Key of the term or of the sensor.
-        channel: Index of the channel, from 0, or "all"; 0 by default. For a sensor, index of the number in its reading: an
-            attitude has roll, pitch and yaw [rad]. For sensors of an estimator, a channel of a `DVL` is a beam. An `IMU`
-            has as channels the means over a period of specific force (0 to 2) [m/s^2] and angular rate (3 to 5) [rad/s].
+        of: Key of the term or of the sensor that has the fault.
+        channel: Index of the channel, from 0, or "all"; 0 by default. For a sensor, a channel is a number in its
+            reading: an attitude has roll, pitch and yaw [rad]. With an estimator, a channel of a `DVL` is a beam; an
+            `IMU` has the means of specific force (0 to 2) [m/s^2] and angular rate (3 to 5) [rad/s] over a period.
         kind: Kind of fault, or a list of kinds from which `choice` selects; "gain" by default.
         choice: Index of the kind in the list `kind`, from 0; 0 by default.
         time: Time at which the fault begins [s]; 0 by default; inf for never.
         until: Time at which the fault ends [s]; inf, the default, for a fault without end.
         gain: Factor on the command or reading; 0 by default.
         offset: Number added to the command or reading, in its unit; 0 by default.
-        value: Command or reading of a channel that is stuck; by default its value when the fault begins.
+        value: Command or reading of a channel that is stuck; by default the position or reading at the onset.
         time_constant: Time constant of kind "slow" [s]; 1 by default.
         delay: Delay of kind "delay" [s], to the nearest tick; 1 by default.
         duty: Fraction of each period, from its start, in which kind "intermittent" is on; 0.5 by default.

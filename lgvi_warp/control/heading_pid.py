@@ -19,7 +19,7 @@ class HeadingPID(IntegralLaw):
     Args:
         kp: Proportional gain [N m/rad].
         ki: Integral gain [N m/(rad s)]; 0 by default.
-        kd: Gain of the yaw rate [N m s/rad]; 0 by default.
+        kd: Gain of the yaw rate error [N m s/rad]; 0 by default.
         integral_limit: Largest size of I [rad s]; 1e6 by default.
         anti_windup: "conditional", the default, stops an integrator while the actuators do not deliver the whole demand
             and further integration would increase the undelivered part. "none" never stops an integrator.

@@ -21,7 +21,7 @@ class HeadingSMC(IntegralLaw):
 
     Args:
         lambda_: Rate at which errors decay while sigma is 0 [1/s]; its name is `lambda` in a scene file.
-        boundary: Half the thickness of the layer about sigma = 0 in which N is continuous [rad/s].
+        boundary: Half the thickness of the layer about sigma = 0 in which sat is linear [rad/s].
         k_sigma: Gain of the switching part [rad/s].
         k_d: Gain of the linear part [1]; 0 by default.
         nomoto_gain: K of Nomoto's model T dr/dt + r = K N [rad/(s N m)].

@@ -20,7 +20,7 @@ class HeavePID(IntegralLaw):
     Args:
         kp: Proportional gain [N/m].
         ki: Integral gain [N/(m s)]; 0 by default.
-        kd: Gain of the depth rate, the downward velocity over ground [N s/m]; 0 by default.
+        kd: Gain of the error of the depth rate, the downward velocity over ground [N s/m]; 0 by default.
         integral_limit: Largest size of I [m s]; 1e6 by default.
         anti_windup: "conditional", the default, stops an integrator while the actuators do not deliver the whole demand
             and further integration would increase the undelivered part. "none" never stops an integrator.

@@ -19,11 +19,11 @@ class Loiter(Guidance):
 
     Let d be the horizontal distance from the centre. The wanted heading is the direction of the circle's tangent, turned
     towards the circle by atan((d - radius) / look_ahead). The wanted heading rate on the circle is speed / radius. For
-    laws that control the pose (`PosePID`, `PoseSMC`), the wanted position and velocity are those of the point of the circle
-    that is abeam of the vehicle. If the vehicle cannot turn at this radius, it follows a wider circle.
+    laws that control the pose (`PosePID`, `PoseSMC`), the wanted position is the nearest point of the circle, and the
+    wanted velocity is `speed` along the tangent there. If the vehicle cannot turn so tightly, its circle is wider.
 
     Args:
-        center: Centre of the circle, (3,) [m], inertial axes; its third number is the depth.
+        center: Centre of the circle, (3,) [m], inertial axes; its third number is the wanted depth.
         radius: Radius of the circle [m].
         speed: Wanted forward speed through the water [m/s].
         look_ahead: Look-ahead distance along the tangent [m]; a few vehicle lengths are usual.

@@ -16,8 +16,8 @@ class LowPass(MeasuringPart):
     """First-order low-pass filter of one measured quantity, exact for readings that are held over a period.
 
     At each tick x <- x + (1 - exp(-T / time_constant)) (measured - x), where x is the output and T the period. x starts at
-    the first reading. A difference of headings is taken within half a turn. An attitude turns by the same fraction of the
-    rotation to the measured attitude.
+    the first reading. Differences of headings are reduced to half a turn. If x is an attitude, it turns by the fraction
+    1 - exp(-T / time_constant) of the rotation to the measured attitude.
 
     Args:
         of: Quantity to filter, one of those that an `lw.control.Sensor` measures.

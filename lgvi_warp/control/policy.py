@@ -51,10 +51,10 @@ PLACES = {name: (place, wish) for place, (name, wish) in enumerate(_places())}
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Policy(ControlLaw):
-    """A trained multilayer perceptron: each layer maps its input y to f(W y + b). The demand is `scale` times the output.
+    """A trained multilayer perceptron: each layer maps its input y to f(W y + b), where f is its activation function.
 
-    The file holds W and b of each layer: weights_0 (n1, n0), biases_0 (n1,), weights_1 (n2, n1), ... as np.savez writes
-    them, uncompressed. n0 is the number of inputs. Nothing in the file is executed.
+    The demand is `scale` times the output. The file holds W and b of each layer: weights_0 (n1, n0), biases_0 (n1,),
+    weights_1 (n2, n1), ... as np.savez writes them, uncompressed. n0 is the number of inputs. Loading runs no code.
 
     Inputs that are wanted minus measured values are "depth_error" [m], "heading_error" [rad], "speed_error" [m/s],
     "position_error" [m, body axes], and "attitude_error", the e_R of `PosePID`. Inputs that are measured values are "depth"

@@ -16,11 +16,11 @@ class PoseSMC(PoseLaw):
 
     For the position, s = (R^T v_d - nu) + 2 lambda R^T e_b + lambda^2 R^T I and f = k_d s + k_sigma sat(s / boundary). For
     the attitude, s_r = -(Omega - R^T R_d Omega_d) - 2 lambda_r e_R - lambda_r^2 I_R, and the moment has the same form as f.
-    All symbols without explanation are those of `PosePID`, and sat(x) is x limited to [-1, 1].
+    Symbols that are not explained here are those of `PosePID`, and sat(x) is x limited to [-1, 1].
 
     Args:
         lambda_: Rates at which position errors decay while s is 0 (3,) [1/s]; its name is `lambda` in a scene file.
-        boundary: Half the thickness of the layer about s = 0 in which f is continuous (3,) [m/s].
+        boundary: Half the thickness of the layer about s = 0 in which sat is linear (3,) [m/s].
         k_sigma: Gains of the switching part (3,) [N].
         k_d: Gains of the linear part (3,) [N s/m].
         lambda_r: As `lambda`, for the attitude (3,) [1/s].

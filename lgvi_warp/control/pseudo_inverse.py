@@ -22,8 +22,8 @@ class PseudoInverse(EffortAllocation):
     For the demand w, weights W and wrenches B of unit efforts, the efforts are t = W^-1 B^T (B W^-1 B^T)^+ w. They
     minimise |B t - w| and, among all t that do so, the sum of weight t^2. Components that no law demands are ignored. An
     effort is the thrust of a thruster, the angle of a fin (with B at `speed`), or the force or moment of a control_wrench.
-    The command of a thruster follows from its curve at zero advance speed: the loss of thrust by advance is not compensated,
-    although the demand counts as delivered. Thrusters with a polynomial need a `limit`. The polynomial is inverted up to
+    The command of a thruster follows from its curve at zero advance speed: a moving thruster gives less thrust, but
+    the demand counts as delivered. Thrusters with a polynomial need a `limit`. The polynomial is inverted up to
     this limit or up to its first maximum, whichever is smaller.
 
     Args:

@@ -59,7 +59,7 @@ class Sensor(MeasuringPart):
     Args:
         of: Measured quantity: "depth", "heading", "position", "attitude", "velocity" (over ground), "water_velocity" or
             "angular_velocity"; velocities are in body axes.
-        noise: Standard deviation of each reading; 0 by default.
+        noise: Standard deviation of the noise of each reading; 0 by default.
         bias: Constant error added to each reading; 0 by default.
         drift: Standard deviation of the random walk after 1 s, in the unit of the reading / s^1/2; 0 by default.
         quantum: Readings are rounded to whole multiples of this number; 0 by default, for no rounding.
@@ -73,9 +73,9 @@ class Sensor(MeasuringPart):
         deepest: Depth of the sensor below which readings are lost [m], as for GPS; inf by default.
         place: Point of the body at which a sensor of position or depth is mounted, (3,) [m], body axes; by default the
             body's origin. The sensor reads the position or depth of this point.
-        reads: Kind of depth reading. "geometry", the default, is the distance from the mean surface. "pressure" is the
+        reads: Kind of depth reading. "geometry", the default, is the depth below the mean surface. "pressure" is the
             reading p / (rho g) of a pressure cell below the scene's tide. It includes the pressure of waves by linear theory,
-            which decays with depth, and is 0 out of the water.
+            which decays with depth. Out of the water the reading is 0.
 
     The reading of the first tick always arrives, without latency and at any depth: it stands for a reading on deck before
     the run. A `DVL`, which needs the floor, has no such reading: its velocity is 0 before the first lock.
@@ -84,8 +84,8 @@ class Sensor(MeasuringPart):
     change the measured motion, no reading is repeated, the first may be lost, and the estimator accounts for the latency.
 
     Raises:
-        SceneError: If `of` is unknown, `every` or `latency` is not a whole number, `place` is given for another quantity, or
-            a number is invalid (see `Term`).
+        SceneError: If `of` is unknown, `every` or `latency` is not a whole number, `place` is given for a sensor of a
+            quantity other than position or depth, or a number is invalid (see `Term`).
 
     Examples:
         >>> import lgvi_warp as lw

@@ -19,7 +19,7 @@ class StateFeedback(ControlLaw):
     wanted values, and R is the attitude, from body to inertial axes.
 
     Args:
-        K: Gains (6, 12) [N, N m per unit of x].
+        K: Gains (6, 12) [N, N m per unit of x], a row for each of X, Y, Z, K, M, N and a column for each entry of x.
     """
 
     type: ClassVar[str] = "state_feedback"

@@ -23,15 +23,15 @@ FASTEST = 1e15
 class Trajectory(Guidance):
     """Wanted position over time, with velocity and heading rate as feedforward.
 
-    Before the first time, the wanted motion is rest at the first position; after the last time, rest at the last position.
+    Before the first time, the vehicle is to rest at the first position; after the last time, at the last position.
 
     Args:
         times: Times (k,) [s], rising, at least two.
         positions: Wanted positions (k, 3) [m], inertial axes.
-        headings: Wanted headings (k,) [rad]; it turns the short way to the next heading. By default no heading is
-            wanted.
-        speed: Wanted forward speeds through the water (k,) [m/s]; by default the size of the wanted velocity. Between times
-            they are interpolated linearly, or held with "steps".
+        headings: Wanted headings (k,) [rad]; the heading turns the short way from each to the next. By default no
+            heading is wanted.
+        speed: Wanted forward speeds through the water (k,) [m/s]; by default the size of the wanted velocity. The
+            speeds are interpolated linearly between times, or held with "steps".
         interpolation: "linear", the default, uses straight lines between positions. "cubic" uses natural cubic splines, whose
             velocities are continuous between the first and the last time. "steps" holds each position, at rest, until the
             next time.

@@ -32,7 +32,7 @@ class Waypoints(Guidance):
 
     y: the vehicle's distance to starboard of the leg, D: look-ahead. The wanted heading is the leg's heading minus an angle:
     "los": atan(y / D);
-    "ilos": atan((y + kappa J) / D), integral dJ/dt = D y / (D^2 + (y + kappa J)^2) (Borhaug, Pavlov & Pettersen 2008);
+    "ilos": atan((y + kappa J) / D), where dJ/dt = D y / (D^2 + (y + kappa J)^2) (Borhaug, Pavlov & Pettersen 2008);
     "alos": beta + atan(y / D), where beta is an estimate of the crab angle with d beta/dt = gamma D y / sqrt(D^2 + y^2)
     (Fossen & Aguiar 2024).
 
@@ -51,11 +51,11 @@ class Waypoints(Guidance):
         kappa: Gain of "ilos" [m/s]; 0.1 by default.
         gamma: Gain of "alos" [rad/(m s)]; 0.002 by default.
         at_end: Behaviour at the last point. With "stop", the default, the wanted heading is that of the last leg, the wanted
-            speed 0 and the wanted position the last point. With "go_on", the vehicle continues straight beyond the end of the
-            last leg. With "loiter", it circles the last point.
+            speed is 0, and the wanted position is the last point. With "go_on", the vehicle continues straight beyond
+            the end of the last leg. With "loiter", it circles the last point.
         times: Arrival time at each point, (k,) [s], rising. Before the first time the wanted speed is 0. By default there are
             no times.
-        loiter_radius: Radius [m] of circles about points.
+        loiter_radius: Radius of circles about points [m], required if there are circles.
         loiter_turns: Number of turns about each point, (k,), 0 at the first point; by default no turns.
         loiter_time: Least time on the circle about each point, (k,) [s], 0 at the first point; by default no time.
         clockwise: Whether the vehicle circles clockwise as seen from above; by default True.

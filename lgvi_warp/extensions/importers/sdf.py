@@ -55,7 +55,7 @@ def from_sdf(
     Args:
         source: Path of the file, or its text.
         model: Name of the model, if the file holds several.
-        link: Name of the main link; by default the plugin's link, or the heaviest root link of the heaviest joined group.
+        link: Name of the main link; by default the plugin's link, else the heaviest root of the heaviest joined links.
         world: Another SDF file (path or text) with a <world> that gives gravity and density for the model.
         buoyancy: Buoyancy [N], instead of the buoyancy of the shapes.
         volume: Displaced volume [m3], instead of the volume of the shapes.
@@ -66,7 +66,7 @@ def from_sdf(
             its <uri> or the last part of its <uri>. By default none; a file named inside `source` is never opened.
 
     Returns:
-        The tables "vehicle", "environment" and "terms" of a scene file. Without a shape the vehicle is neutral.
+        The tables "vehicle", "environment" and "terms" of a scene file. Without any volume, the vehicle is neutral.
 
     Raises:
         SceneError: If the file is invalid: a mass is not a number, a mesh has no `volume`, the file is a template, etc. The

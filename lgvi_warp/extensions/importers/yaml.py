@@ -54,7 +54,7 @@ def from_yaml(
 
     The file has these keys, at its top level or in one of its tables:
 
-    * mass, inertia about the centre of gravity (3, 3x3 or ixx ...), centre of gravity (cog) and of buoyancy (cob); or
+    * mass, inertia about the centre of gravity (3, 3x3 or ixx ...), centres of gravity (cog) and buoyancy (cob); or
       mass_matrix (6x6 or 6), the matrix of the rigid body about the origin of the axes;
     * volume (with density), buoyancy or neutrally_buoyant;
     * added_mass (6x6 or 6); linear_damping, linear_damping_forward_speed and quadratic_damping (6 or 6x6), as
@@ -69,7 +69,7 @@ def from_yaml(
         matrix_axes: Axes of added mass and damping: "frd" (as in uuv_simulator; default) or "flu".
         quadratic: Entries used of a 6x6 matrix of quadratic damping: "diagonal" (as in uuv_simulator; default), or "full"
             for the whole matrix.
-        ignore: Keys to leave out; other unknown keys are refused. By default none.
+        ignore: Keys to leave out, none by default; other unknown keys are refused.
         table: Path in the file to the table to read, such as "vehicle.dynamics", or a list of keys; by default the whole
             file.
         **given: Values by key (mass=..., density=...), which are added to the values of the file or replace these.

@@ -52,7 +52,7 @@ class Vehicles:
         observe: Names of numbers, as listed in docs/controllers/gym.md and including the inputs of `lw.control.Policy`; or a
             function that returns (m, k).
         act: "demand", the default: actions are added to the laws' demands. "command": actions are the commands of the only
-            term that takes commands. With the key of a term, actions are the commands of this term. Such commands replace
+            term that takes commands. With the key of a term, actions are the commands of this term. They replace
             the commands that the laws would give.
         reward: Function that returns rewards (m,), with the actions (m, n) as an optional fourth argument; by default 0.
         terminated: Function that returns truth values (m,), True for each episode to end; None by default.
@@ -60,9 +60,9 @@ class Vehicles:
             such a duration, episodes are not truncated.
         num_envs: Number of environments; by default the number of members of the ensemble.
         outputs: Components of the demand that the actions set, among "X", "Y", "Z", "K", "M", "N"; all by default.
-        scale: Demand or command at an action of 1, one number for all or one for each; actions are then in [-1, 1]. None, the
-            default: actions are demands in N and N m without bounds, or commands in their unit within their limits.
-        instead_of: Keys of laws that the actions replace. A `Callback` is always replaced. None by default.
+        scale: Demand or command at an action of 1, one number for all or one for each; actions are then in [-1, 1]. By
+            default, actions are demands in N and N m without bounds, or commands in their unit within their limits.
+        instead_of: Keys of laws that the actions replace; by default none. A `Callback` is always replaced.
         autoreset_mode: gymnasium.vector.AutoresetMode or its value: "NextStep" (default), "SameStep" or "Disabled".
         method: A name or a Method; by default the scene's.
         h: Step [s]; by default the scene's.
@@ -235,7 +235,7 @@ class Vehicles:
         """Begin new episodes of all environments, with the time at 0, or of the environments in options["reset_mask"].
 
         Args:
-            seed: Seed of all draws from now on; episodes are counted from 0 again. None, the default: the episodes use the
+            seed: Seed of all draws from now on; episodes are counted from 0 again. By default (None), episodes use the
                 next members of the present seed. The first seed is that of the ensemble.
             options: {"reset_mask": truth values (num_envs,)}; None (default) for all environments.
 
@@ -243,8 +243,8 @@ class Vehicles:
             (observations of all environments, {}).
 
         Raises:
-            TypeError: If the seed or the mask is of another type.
-            ValueError: If the mask has another shape, or is False throughout.
+            TypeError: If the seed is not a whole number, or the mask not an array of truth values.
+            ValueError: If the shape of the mask is not (num_envs,), or the mask is False throughout.
         """
         if seed is not None and not isinstance(seed, int | np.integer):
             raise TypeError(f"seed = {brief(seed)} is not a whole number. Give one for all environments")
@@ -285,7 +285,7 @@ class Vehicles:
             Gymnasium requires.
 
         Raises:
-            ValueError: If the actions have another shape, or are not real numbers.
+            ValueError: If the shape of the actions is not (num_envs, n), or they are not real numbers.
             ResetNeeded: Before the first `reset`; with autoreset "Disabled" after an episode has ended; and after
                 2^31 integration steps, when all environments must be reset.
         """

@@ -24,7 +24,7 @@ class TimeAverage(NamedTuple):
         mean: Mean over all members and times; NaN if there are no values.
         degrees: Degrees of freedom of one value, equal to the mean that a consistent filter has.
         effective: Effective sample size, the number of independent values with the same information.
-        p: Two-sided p-value: probability that a consistent filter has a mean at least as far off; NaN without a mean.
+        p: Probability that a consistent filter's mean is at least as far from `degrees` (two-sided); NaN without mean.
     """
 
     mean: float
@@ -39,16 +39,16 @@ class Consistency(Summarized):
 
     Attributes:
         time: Times of the samples (k,) [s].
-        members: Number of members still under way (k,).
-        nees: Mean over the members of e^T P^-1 e (k,), 15 for a consistent filter; NaN if round-off spoils a filter's
-            covariance.
+        members: Number of members still under way at each time (k,).
+        nees: Mean over the members of e^T P^-1 e (k,), with a filter's error e and covariance P: 15 for a consistent
+            filter; NaN if round-off spoils a covariance.
         nees_band: Lower and upper end of the band of `nees` (k, 2).
         nis: Mean of squared innovations divided by their variances (k,), 1 for a consistent filter; NaN at times without
             innovations.
         nis_band: Lower and upper end of the band of `nis` (k, 2); NaN at times without innovations.
         level: Probability that a consistent filter is inside its band at a time.
         nees_average: Test of the mean of NEES over members and times, with its effective sample size and its p-value.
-        nis_average: Test of the mean of NIS; the innovations of a consistent filter are independent of one another.
+        nis_average: Test of the mean of NIS over members and times; in a consistent filter its values are independent.
     """
 
     time: np.ndarray
@@ -124,7 +124,7 @@ def consistency(result: Any, level: float = 0.95) -> Consistency:
     """Test whether the filters of an ensemble are consistent: chi-square tests of NEES and NIS at each time.
 
     A filter is consistent if its errors have the size that its covariance predicts. If in addition the model is linear and
-    the noise is normal, NEES = e^T P^-1 e, with the true error e, has a chi-square distribution with 15 degrees of freedom.
+    the noise is normal, NEES = e^T P^-1 e (error e, covariance P) is chi-square distributed with 15 degrees of freedom.
     Each squared innovation divided by its variance (NIS) has one degree of freedom. Members are independent, so the degrees
     of freedom of sums over members add up (Bar-Shalom, Li & Kirubarajan 2001, *Estimation with Applications to Tracking and
     Navigation*, section 5.4). Errors of one member at two times are not independent, so an ensemble may by chance be

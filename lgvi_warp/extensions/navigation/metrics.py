@@ -28,13 +28,13 @@ class OfFilter(Metric):
 class NEES(OfFilter):
     """Mean over a member's ticks of e^T P^-1 e, the filter's normalised squared error; then statistics over members.
 
-    Its expected value is 15 for a consistent filter, which has 15 states. Errors of one member at two ticks are not
-    independent, so use `lw.metrics.consistency` for a test over members. The filter needs report=True.
+    e is the error and P the covariance of its 15 states. A consistent filter has the expected value 15. Errors at two
+    ticks are not independent, so use `lw.metrics.consistency` for a test over members. The filter needs report=True.
 
     Args:
         of: "nees", the default.
-        then: Statistic of these numbers over the members, or a list, each without its `of`: lw.statistics.Mean(), the
-            default, lw.statistics.Quantiles(), ...
+        then: Statistic of these numbers over the members, or a list of statistics, without their argument `of`, such
+            as lw.statistics.Quantiles(); by default lw.statistics.Mean().
     """
 
     type: ClassVar[str] = "nees"
@@ -63,8 +63,8 @@ class NIS(NEES):
 
     Args:
         of: "nis", the default.
-        then: Statistic of these numbers over the members, or a list, each without its `of`: lw.statistics.Mean(), the
-            default, lw.statistics.Quantiles(), ...
+        then: Statistic of these numbers over the members, or a list of statistics, without their argument `of`, such
+            as lw.statistics.Quantiles(); by default lw.statistics.Mean().
     """
 
     type: ClassVar[str] = "nis"
@@ -87,8 +87,8 @@ class Rejected(OfFilter):
 
     Args:
         of: "rejected", the default.
-        then: Statistic of these numbers over the members, or a list, each without its `of`: lw.statistics.Mean(), the
-            default, lw.statistics.Quantiles(), ...
+        then: Statistic of these numbers over the members, or a list of statistics, without their argument `of`, such
+            as lw.statistics.Quantiles(); by default lw.statistics.Mean().
 
     Examples:
         >>> import lgvi_warp as lw

@@ -58,8 +58,8 @@ class MovingMass(Term):
         limit: Largest size of the command of each channel, (c,) [m, rad]; by default no limit.
         rate_limit: Largest rate of each channel, (c,) [m/s, rad/s]; by default no limit.
         time_constant: Time constant of the lag of each channel, (c,) [s]; 0 by default, for no lag.
-        inertia: Whether the vehicle's inertia changes as the mass moves: True, False, or "auto", the default, which is True
-            if the mass exceeds a tenth of the vehicle's mass.
+        inertia: Whether the vehicle's inertia changes as the mass moves: True, False, or "auto" (default), which is
+            True if the mass exceeds a tenth of the vehicle's mass.
 
     Raises:
         SceneError: If times do not rise or are missing, a direction has length 0, limits or time constants are given

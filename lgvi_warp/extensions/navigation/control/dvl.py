@@ -50,7 +50,7 @@ class DVL(MeasuringPart):
         outlier: Probability that the reading of a beam is an outlier, independently for each beam; by default no outliers.
         outlier_std: Standard deviation of the error that an outlier adds to the reading [m/s].
         every: Number of ticks from one new reading to the next, a whole number; 1 by default.
-        floor: Key of the scene's `lw.events.Floor` that reflects the beams; with "", the default, every beam has an echo.
+        floor: Key of the scene's `lw.events.Floor` that reflects the beams; with "", the default, beams need no floor.
         least_range: Shortest distance along a beam to the floor [m]; 0 by default.
         greatest_tilt: Largest angle of the body's third axis from straight down at which beams have echoes [rad]; by default
             there is no limit.

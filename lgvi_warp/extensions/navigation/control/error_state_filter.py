@@ -54,8 +54,8 @@ class ErrorStateFilter(MeasuringPart):
     List it after the sensors that it names. These sensors pass their readings only to the filter. The filter replaces the
     measured position, attitude, velocity over ground and angular velocity by its estimates. At each tick the IMU's
     increments propagate the estimate. Then each new reading updates it, number by number in Joseph's form. A delayed fix
-    updates a copy of the position and its covariances made when the fix was taken (stochastic cloning); up to 8 fixes may
-    be pending. For all members, the filter assumes the sensor noise of the scene, times `process_scale` for
+    updates a copy of position and covariances that was stored when the fix was taken (stochastic cloning). Up to 8
+    fixes may be pending. For all members, the filter assumes the sensor noise of the scene, times `process_scale` for
     the IMU and `measurement_scale` for others. It estimates the biases of the IMU, but no other bias, drift or rounding.
 
     The first estimate is the truth plus an error with the standard deviations below, drawn once for each member.

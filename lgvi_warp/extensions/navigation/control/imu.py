@@ -34,10 +34,10 @@ class IMU(MeasuringPart):
 
     T is the period of the controller, v the velocity over ground of the unit's position, R_k the attitude at tick k, and g
     gravity. b is a bias, b_w of the gyroscopes and b_a of the accelerometers. xi are standard normal numbers that follow
-    from the seed, the member, the tick and the unit's name. The Allan variance is noise^2 / t + walk^2 t / 3 (IEEE Std
-    952-1997). An `error_state_filter` uses the increments. Without a filter, the unit replaces the measured angular velocity
-    by its mean over the last period. In that case list a `DVL` before the unit: a later `DVL` would use this mean instead of
-    the true rate.
+    from seed, member, tick and unit name. The Allan variance over the averaging time t is noise^2 / t + walk^2 t / 3
+    (IEEE Std 952-1997). An `error_state_filter` uses the increments. Without a filter, the unit replaces the measured
+    angular velocity by its mean over the last period. In that case list a `DVL` before the unit: a later `DVL` would
+    use this mean instead of the true rate.
 
     Args:
         place: Position of the unit (3,) [m], body axes; 0 by default.

@@ -32,8 +32,8 @@ class Assimilated(Summarized, Saved):
             angular_velocity (k, 3) [rad/s] in body axes, attitude (k, 3, 3), and the learned numbers by name, (k, ...).
         std: Standard deviations of the same quantities; those of the attitude are (k, 3) [rad], about the body's axes.
         innovations: {series: measured minus predicted values (k, m)}; NaN if a series has no value at a time.
-        innovation_std: Expected standard deviations of the innovations, (k, m): square root of the sum
-            of the predictions' variance and the instrument's variance.
+        innovation_std: {series: expected standard deviations of the innovations (k, m)}, the square root of the sum of
+            the predictions' variance and the instrument's variance.
         whitened: {series: innovations multiplied by the inverse square root of their covariance (k, m)}.
         left_out: {series: whether the gate left its values out at each time (k,)}.
         log_likelihood: Logarithm of the probability density of all measured values, each given the values before it, without
@@ -134,7 +134,7 @@ class Assimilated(Summarized, Saved):
             yield {"time": float(time), "effective": float(self.effective[k])} | entries
 
     def consistency(self, level: float = 0.95) -> dict[str, InnovationTest]:
-        """Test whether innovations are those of a consistent filter: normal, with the expected variance, independent in time.
+        """Test whether innovations are those of a consistent filter: normal, of expected variance, independent in time.
 
         Args:
             level: Probability that all numbers of a consistent filter are inside their bands, in (0, 1); 0.95 by default.

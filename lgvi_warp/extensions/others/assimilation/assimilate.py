@@ -81,9 +81,9 @@ def assimilate(
         series: One or several lw.studies.Series, the measurements of the instruments.
         learn: Names of varied numbers to estimate, such as ["current.velocity[0]"]; by default none.
         filter: "etkf", the default, is an ensemble Kalman filter without random draws (Bishop, Etherton & Majumdar 2001).
-            "enkf" perturbs the measurement for each member (Burgers, van Leeuwen & Evensen 1998). Both have no localisation
-            and suit spreads that are small enough for nearly linear motion. "particles" is a particle filter with systematic
-            resampling (Kitagawa 1996), for any spread.
+            "enkf" perturbs the measurement for each member (Burgers, van Leeuwen & Evensen 1998). Neither is localised.
+            Both suit spreads that are small enough for nearly linear motion. "particles" is a particle filter with
+            systematic resampling (Kitagawa 1996), for any spread.
         method: As in `lw.solve`.
         h: Step [s], which divides every time of the series; by default the scene's step.
         dtype: As in `lw.solve`.

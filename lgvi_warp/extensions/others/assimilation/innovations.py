@@ -17,7 +17,7 @@ class InnovationTest(Summarized):
     Attributes:
         count: Number of values that were compared.
         left_out: Number of values that the gate left out, which are not compared.
-        ratio: Root mean square of the innovations divided by the value that their covariance predicts; 1 if consistent.
+        ratio: Root mean square of the innovations divided by the value that their covariance predicts, 1 if consistent.
         ratio_band: Lower and upper end of the band of `ratio` (2,).
         mean: Mean of each component's innovations divided by their standard deviations (m,), 0 for a consistent filter.
         mean_band: Half width of the band of `mean` (m,).

@@ -58,14 +58,14 @@ class LinearMPC(ControlLaw):
 
     The model is x' = A x + B u + d from tick to tick. At each tick the inputs of the next `horizon` periods minimise the
     sum of (x - x_s)^T Q (x - x_s) + (u - u_s)^T R (u - u_s), plus (x - x_s)^T P (x - x_s) at the end. The inputs satisfy
-    |u| <= `limit`, and their rates are at most `rate_limit`. The input of the first period is the demand; the next tick
-    repeats this with new measurements. If the unconstrained optimum satisfies the limits, it is used, to round-off.
+    `lower` <= u <= `limit`, and their rates are at most `rate_limit`. The input of the first period is the demand; the
+    next tick repeats this with new measurements. If the unconstrained optimum is within the limits, it is the solution.
     Otherwise an interior-point method (Nocedal & Wright 2006, algorithm 16.4) solves the constrained problem. Its demand is
     accurate to 1e-6 of the limit, in float32 to 1e-2. The run's messages report ticks at which the method had not converged.
 
-    d is the estimated disturbance: the measured x minus its prediction, filtered over `disturbance_time`. For the prediction,
-    the last reference is continued at its rates. x_s and u_s are the steady state under d in which the `tracked` errors are
-    0, so constant disturbances cause no error in these states. The prediction uses only the delivered demand.
+    d is the estimated disturbance: measured x minus predicted x, low-pass filtered with `disturbance_time`. For the
+    prediction, the last reference is continued at its rates. x_s and u_s are the steady state under d in which the
+    `tracked` errors are 0, so constant disturbances cause no error in them. Predictions use the delivered demand.
     `lw.linear.mpc` creates the law from a linear model.
 
     Args:
@@ -85,7 +85,7 @@ class LinearMPC(ControlLaw):
             `states`.
         lower: Least inputs (m,) [N, N m], below `limit`; by default -limit.
         outputs: Combinations C of the states (p, n) that have a limit, C x <= output_limit at each tick of the horizon; by
-            default none. For a lower limit give -C.
+            default none. For a lower limit, give -C and the negative limit.
         output_limit: Largest outputs (p,), each in the unit of its row of C x.
         excess_cost: Cost of one unit of an output beyond its limit, at each tick (p,), above 0. With a sufficiently high
             cost, a limit is exceeded only if no inputs can satisfy it.

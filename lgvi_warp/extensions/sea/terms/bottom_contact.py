@@ -38,7 +38,7 @@ class BottomContact(Term):
 
     Args:
         points: Points of the hull that may touch the floor, (k, 3) [m] from the body's origin.
-        friction: Coefficient of friction, the tangent of the friction cone's angle; 0.5 by default.
+        friction: Coefficient of friction, the tangent of the friction angle; 0.5 by default.
         stiffness: Stiffness of the floor at each point [N/m]; by default the limit for the step.
         damping: Damping at each point [N s/m]; by default critical damping. The step sets an upper bound, and a lower bound
             below which a bounce could gain energy.

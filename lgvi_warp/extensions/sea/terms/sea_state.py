@@ -52,8 +52,8 @@ class SeaState(WaveTerm):
         depth: Depth of the sea [m]; by default the depth of the scene's flat floor. Without such a floor the water is deep.
         periods_of: Frame of the periods in a uniform current: "ground", the default, as measured by a moored buoy; or
             "water", as measured by a buoy that drifts with the current.
-        seed: Seed, a whole number from 0, of a sea that all members share. None, the default: each member has its own sea,
-            drawn with the seed of the ensemble.
+        seed: Seed, a whole number from 0, of a sea that all members share. By default (None), each member has its own
+            sea, drawn with the seed of the ensemble.
         levels: Uniform random numbers in (0, 1) that determine the frequency, the phase and, if these are random, the heading
             and amplitude of each wave, (components, 2 to 4); by default they are drawn.
 

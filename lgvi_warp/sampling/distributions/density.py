@@ -23,12 +23,12 @@ AT_ONCE = 4_000_000
 
 @dataclass(frozen=True, eq=False)
 class KernelDensity(JointLaw):
-    """Gaussian kernel density of draws, such as posterior draws: of one number, or of several numbers jointly.
+    """Gaussian kernel density of draws, such as posterior draws, of one number or of several numbers jointly.
 
     Its values are absolute: the scene's own value is not used. The density is the mean of normal distributions
-    (kernels) about the draws. For one number, the value rises with the level, so that Sobol points and other designs
+    (kernels) about the draws. For one number, the value rises with the design's level in (0, 1), so that Sobol points
     remain evenly spread. For several numbers, one level selects a draw, and the other levels select the displacement
-    from this draw.
+    from it.
 
     Args:
         draws: n draws, (n,) of one number or (n, d) of d numbers jointly: the entries of a vector, or of several

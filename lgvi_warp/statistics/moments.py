@@ -149,9 +149,9 @@ class Covariance(Statistic):
     """Covariance matrix over members, within one quantity or across several.
 
     The interval uses Student's t with n - 2 degrees of freedom for n members. Its standard error follows from their
-    fourth moments (delta method); normality is not assumed. For a variance, the logarithm's interval is computed, which
-    is closer to normal. Fourth moments of few members are biased towards small values; the bias for normal members, a
-    term of order 1 / n, is corrected (Bonett 2006 for variances). With two members the interval is infinite.
+    fourth moments (delta method); normality is not assumed. For a variance, the interval is that of its logarithm,
+    which is closer to normal. Fourth moments of few members are biased towards small values; the bias for normal
+    members, a term of order 1 / n, is corrected (Bonett 2006 for variances). With two members the interval is infinite.
 
     Arrays of the estimate, in addition to lower, upper and count (k,), for k sample times and d components:
 

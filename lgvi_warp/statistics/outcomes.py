@@ -103,9 +103,9 @@ class Outcome(OfEnds):
     Arrays of the estimate, in addition to lower and upper, at k sample times:
 
     * value (k,): the probability; survival is 1 - value.
-    * alone (k,): Kaplan & Meier's estimate (1958) of the probability if no other event stopped members; these events
-      censor. It assumes that the stopped members would have continued like the others. No run can confirm this
-      assumption, and it rarely holds (a vehicle that surfaces does not sink). Interval: alone_lower, alone_upper.
+    * alone (k,): Kaplan & Meier's estimate (1958) of the probability if no other event stopped members. Members that
+      other events stop are censored, as if they had continued like the others. No run can confirm this assumption, and
+      it rarely holds (a vehicle that surfaces does not sink). Interval: alone_lower, alone_upper.
     * fraction (k,): members that have ended with the outcome, as a fraction of all members, including failed members;
       fraction_lower, fraction_upper: Wilson's interval.
     * ended, otherwise, failed (k,): numbers of members that have ended by each time. `ended`: with the outcome;

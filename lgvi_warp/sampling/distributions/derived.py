@@ -23,8 +23,8 @@ class Derived(JointLaw):
     functions: to use a run that was read from a file, give the ensemble again.
 
     Args:
-        functions: Name of a number -> function that returns the number of each member. The arguments of the function
-            are factors, by name; each is an array that can be multiplied by the scene's value of the number.
+        functions: Name of a number -> function that returns the number of each member. Arguments of the function have
+            names of factors. Each is an array, shaped so that it can be multiplied by the scene's value of the number.
         factors: Distribution of each factor, for a single number. Where a distribution otherwise uses the scene's value
             (for example as its mean), it uses 1 here.
 

@@ -75,9 +75,9 @@ def estimate(
     Choices use counted costs (steps times force evaluations per step), so the same seed gives the same answer, to the
     bit, on any number of threads. `recipe` of the answer stores the choices, so that the same members can run again.
 
-    A sample of n members can miss up to a fraction 3 / n of all members that behaves differently. To estimate the
-    effect of this fraction, 512 to 2,048 members spread over all inputs, and members with extreme inputs, are run. A
-    message gives the fraction of members that a mean may have missed. Rare values of a Choice are separate strata.
+    A sample of n members can miss a group that behaves differently, up to a fraction 3 / n of all members. To estimate
+    the effect of such a group, 512 to 2,048 members spread over all inputs, and members with extreme inputs, are run. A
+    message gives the fraction of members that a mean may have missed. Rare values of a Choice form separate strata.
 
     Args:
         fleet: the ensemble, or a Scene with one. Members are drawn anew from its distributions, without its sampling.

@@ -148,7 +148,7 @@ def linearize(
         period: Period of a plant [s]. Default: the controller's period; without a controller, the step.
         method: As in `lw.solve`. Default: the method of the trim; without a trim, the scene's method.
         h: Step [s]. Default: the step of the trim; without a trim, the scene's step.
-        step: Increment of the central differences; for numbers above 1, as a fraction of the number. Default 1e-5.
+        step: Increment of the central differences; for |number| > 1, as a fraction of |number|. Default 1e-5.
 
     Returns:
         The model.

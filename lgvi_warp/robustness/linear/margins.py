@@ -289,7 +289,7 @@ def margins(
     examined: slow integral action hides small fast limit cycles. If the loop gains and loses stability several times as
     the factor or delay grows, the margin is at one of these changes.
 
-    Noise and drift of sensors are set to 0, their mean; by eigenvalues, rounding, too. Faults are off; see `messages`.
+    Noise and drift of sensors are set to 0, their mean; by eigenvalues, so is rounding. Faults are off; see `messages`.
 
     The phase margin is the smallest phase shift, lag or lead, of all components of the law's demand that makes the loop
     unstable. For one component it follows from the crossovers of the gain; for several, from the crossovers of the

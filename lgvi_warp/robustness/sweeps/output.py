@@ -182,7 +182,7 @@ class Sweep(SweepTable):
         return ranks(self, at)
 
     def worst(self, count: int = 20, by: str | None = None, case: str | None = None) -> list[dict[str, Any]]:
-        """Find the worst members of all cells: first failed members, the earliest first, then the largest metrics.
+        """Find the worst members of all cells: failed members (the earliest first), then members of largest metric.
 
         Args:
             count: number of members; by default 20.

@@ -36,7 +36,7 @@ class RareEvent(Saved):
         interval: (lower, upper), 95 % interval, by Student's t for the logarithm of the probability.
         relative_error: relative standard error of the probability.
         estimator: "importance", "subset", "plain" or "splitting".
-        members: number of members run, by setting: "scene" and the entries of `cheaper`; with splitting, in whole runs.
+        members: number of members run, by setting: "scene" and the entries of `cheaper`; with splitting, as whole runs.
         failing: the m failing members, a `Table` for lw.Ensemble(scene, sampling=found.failing); None if only noise
             varies. With splitting a member may occur several times, with different noise.
         normals: (m, d), standard normal scores of the d varied numbers of the failing members, in the order of `moved`.

@@ -181,7 +181,7 @@ class SobolIndices(Indices):
         total: fraction due to each factor with all its interactions (m, d) [1].
         total_confidence: half width of the interval of `total` (m, d).
         second: fraction due to each interaction of two factors (m, d, d) [1]; symmetric, NaN on the diagonal; or None.
-        second_confidence: half width of the interval of `second` (m, d, d), or None.
+        second_confidence: half width of the interval of `second` (m, d, d); None if not estimated.
     """
 
     first: np.ndarray

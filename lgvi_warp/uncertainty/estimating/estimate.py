@@ -80,7 +80,7 @@ def estimate(
     message gives the fraction of members that a mean may have missed. Rare values of a Choice form separate strata.
 
     Args:
-        fleet: the ensemble, or a Scene with one. New members are drawn from its distributions; its sampling is ignored.
+        fleet: the ensemble, or a Scene with one. New members are drawn from its distributions; its sampling is unused.
         of: statistic to estimate, at the end of the run: a text such as "mean position[0]", "depth above 3", "outcome
             floor" or "max(depth)"; lw.statistics.Mean, Exceedance, Outcome, FirstPassage or Quantiles with one level;
             or a metric such as lw.metrics.ITAE("depth").

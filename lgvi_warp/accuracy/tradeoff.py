@@ -248,7 +248,7 @@ def tradeoff(
     """Measure cost and error of methods, steps, precisions and solvers on the first members of a fleet.
 
     The cost of a step is the smallest of several readings of its thread's CPU time; all steps of a method share this
-    cost. A message reports readings that disagree. Errors are measured from one of two fine runs, which agree to a
+    cost. A message reports readings that disagree. Errors are differences from one of two fine runs, which agree to a
     tenth of the smallest error shown. If noise acts, all runs share one noise path, drawn at the scene's noise_step or,
     without a noise_step, at a shorter interval than any step tried. If no path can be shared, or the path is too rough
     for errors of members, only statistics are compared, with the statistics of the finest run.
@@ -262,8 +262,8 @@ def tradeoff(
         methods: names of the methods to try. `missing` of the result lists named methods without a measurement.
             Default: all methods that can run the scene.
         members: number of members in the sample. Default 128.
-        seconds: processor time to spend [s]; compiling kernels may take as long again. Every method first runs with one
-            coarse step; then the steps are halved in turn. The messages list what is left out. Default 45.
+        seconds: processor time to spend [s]; compiling kernels may take as long again. Every method first runs at one
+            coarse step size; then its step sizes are halved in turn. The messages list what is left out. Default 45.
         progress: True shows a bar or lines, as in lw.solve; a function is called with the completed fraction, from 0 to 1.
 
     Returns:

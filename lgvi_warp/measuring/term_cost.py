@@ -37,11 +37,11 @@ def term_cost(
 
     Args:
         scene: The scene.
-        method: Name of the method, or a Method; default the method that runs the whole scene.
-        h: Step [s]; default `run.step` of the scene.
-        dtype: "float64", "float32" or "float32_compensated"; default the scene's precision.
-        members: Number of vehicles in the timed run; default 64.
-        rounds: Number of readings of each scene; default 5.
+        method: Name of the method, or a Method; by default the method chosen for the whole scene.
+        h: Step [s]; by default `run.step` of the scene.
+        dtype: "float64", "float32" or "float32_compensated"; by default the scene's precision.
+        members: Number of vehicles in the timed run; by default 64.
+        rounds: Number of readings of each scene; by default 5.
 
     Returns:
         A row for each scene: "term", "method", "dtype", "ns_per_vehicle_step" [ns], and "more_than_none" [ns], the

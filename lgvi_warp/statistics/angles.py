@@ -27,15 +27,15 @@ HATS = notation.hat(np.eye(3)) + 0.0
 class CircularMean(Statistic):
     """Mean direction of angles [rad], with the resultant length.
 
-    The interval of the direction follows from normal theory (delta method from the covariance of cosine and sine). It
-    is the whole circle if the resultant is not significantly above 0. The interval of the resultant length is computed
-    for the logarithm of 1 minus the length, as for a variance (see Covariance); with two members it is 0 to 1.
+    The interval of the direction follows from normal theory (delta method, covariance of cosine and sine). It is the
+    whole circle if the resultant length is not significantly above 0. The interval of the resultant length is computed
+    for the logarithm of 1 minus the length, as for a variance (see Covariance). With two members it is (0, 1).
 
     Arrays of the estimate, in addition to lower, upper and count (k,), for k sample times and d components:
 
     * value (k, d) [rad]: the mean direction, in (-pi, pi].
-    * resultant_length (k, d): length of the mean of the unit vectors: 1 if all angles are equal, 0 if they spread over
-      the whole circle; its interval is resultant_length_lower, resultant_length_upper.
+    * resultant_length (k, d): length of the mean of the unit vectors: 1 if all angles are equal, 0 if they spread
+      evenly over the circle. Its interval is resultant_length_lower to resultant_length_upper.
     * circular_deviation (k, d) [rad]: sqrt(-2 log(resultant_length)).
     * standard_error (k, d) [rad]: standard error of the mean direction.
 
@@ -145,12 +145,12 @@ class MeanAttitude(Statistic):
 
     * value (k, 3, 3): the mean rotation; lower, upper: interval of each of its entries, to first order.
     * dispersion (k,) [rad]: sqrt(mean of |R - value|^2 / 2); for small angles it is the root mean square angle.
-    * covariance (k, 3, 3) [rad^2]: covariance of v in R = value exp(hat(v)), in body axes, to first order.
+    * covariance (k, 3, 3) [rad^2]: covariance of the rotation vector v of value^T R, in body axes, to first order.
     * rotation_half_width (k, 3) [rad]: half width of the mean's interval about each body axis.
     * standard_error (k, 3) [rad]: standard error of the mean about each body axis.
 
     Args:
-        of: "attitude", the only quantity and the default.
+        of: "attitude", the only allowed quantity and the default.
     """
 
     type: ClassVar[str] = "mean_attitude"

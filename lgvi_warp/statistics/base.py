@@ -104,8 +104,8 @@ class Statistic(Documented):
             (see lw.statistics.Quantity).
         name: Key of the estimate in the result; by default the type and the quantity, as in "mean position".
         confidence: Confidence level of the intervals, between 0 and 1; by default 0.95.
-        stopped: After an event stopped a member, "held" counts the member with its last state; "left_out" leaves it
-            out.
+        stopped: After an event stopped a member, "held" (default) counts the member with its last state; "left_out"
+            omits the member.
         at: An outcome, such as "floor": the statistic is over the members with this outcome, in their final state.
             None, the default: the statistic is over all members, at each sample time.
 

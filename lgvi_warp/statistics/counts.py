@@ -56,8 +56,8 @@ class Histogram(Counted):
     Args:
         edges: rising edges of the bins, in the quantity's unit.
         bins: number of bins of equal width.
-        limits: (low, high), first and last edge of bins of equal width, in the quantity's unit; or "run", only for
-            statistics of times (see EndTime): from the first to the last sample time.
+        limits: (low, high), first and last edge of bins of equal width, in the quantity's unit; or "run", for the first
+            and the last sample time; only statistics of times accept "run" (see EndTime).
     """
 
     type: ClassVar[str] = "histogram"
@@ -202,7 +202,7 @@ class Condition(Statistic):
 
 @dataclass(frozen=True, eq=False)
 class Exceedance(Condition, Counted):
-    """Probability that a condition holds at each of k sample times, for d components: value (k, d), Wilson's interval.
+    """Probability that a condition holds: value (k, d) at k sample times for d components, with Wilson's interval.
 
     Args:
         above: lower limit, one number or one for each component, in the quantity's unit.

@@ -148,8 +148,8 @@ class Mean(Statistic):
 class Covariance(Statistic):
     """Covariance matrix over members, within one quantity or across several.
 
-    Interval: Student's t with n - 2 degrees of freedom, and the standard error from the n members' own fourth moments
-    (delta method), which does not assume normal members. For a variance, the interval is computed for its logarithm,
+    The interval uses Student's t with n - 2 degrees of freedom for n members. Its standard error follows from their
+    fourth moments (delta method); normality is not assumed. For a variance, the interval is that of its logarithm,
     which is closer to normal. Fourth moments of few members are biased towards small values; the bias for normal
     members, a term of order 1 / n, is corrected (Bonett 2006 for variances). With two members the interval is infinite.
 
@@ -181,7 +181,7 @@ class Covariance(Statistic):
 
         docs/theory/estimators.md, (E3).
 
-        The interval is s_ij -+ t n / (n - 1)
+        For deviations x from the mean of n members, the interval of the covariance s_ij is s_ij -+ t n / (n - 1)
         sqrt((E[x_i^2 x_j^2] - E[x_i x_j]^2 + (E[x_i^2] E[x_j^2] + 2 E[x_i x_j]^2) / n) / (n - 1)).
         """
         count = part["count"]

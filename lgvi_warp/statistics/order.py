@@ -31,7 +31,7 @@ EndsOf = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 class Extremes(Statistic):
     """Smallest and largest value over members, and the members that have them.
 
-    An extreme has no confidence interval; instead, `beyond` bounds the fraction of the distribution outside.
+    Extremes have no confidence interval; `beyond` bounds the fraction of the distribution outside the extremes.
 
     Arrays of the estimate, in addition to count (k,), for k sample times and d components:
 
@@ -94,10 +94,10 @@ class Extremes(Statistic):
 
 @dataclass(frozen=True, eq=False)
 class Quantiles(Statistic):
-    """Quantiles over members: exact for up to `size` members, for more members from a sketch with a proven error bound.
+    """Quantiles over members: exact for up to `size` members, beyond that from a sketch with a proven error bound.
 
-    Interval: from the ranks of the sorted values (binomial, for any distribution), widened by the sketch's standard
-    error. The interval is infinite if too few members lie beyond the level. Each replicate has its own sketch.
+    The interval follows from the ranks of the sorted values (binomial, for any distribution), and is widened by the
+    sketch's standard error. It is infinite if too few members lie beyond the level. Each replicate has its own sketch.
 
     Arrays of the estimate, in addition to lower, upper and count (k,), for k sample times and d components:
 

@@ -96,22 +96,22 @@ class Outcome(OfEnds):
     The probability is Aalen & Johansen's estimate (1978) of the cumulative incidence: a member that another event
     stopped can no longer have this outcome. A member that fails is censored at its failure, unless the outcome is a
     failure. If no member fails, the estimate is the fraction of all members. The probabilities of all events and of
-    "ok" (the end of the run) sum to 1. Interval: Wilson's, for the number of members at which a simple fraction has the
-    variance of a Dirichlet product; without failures, this is the number of all members. Times of events are exact, not
-    rounded to sample times.
+    "ok" (the end of the run) sum to 1. The interval is Wilson's for an equivalent number of members: a simple fraction
+    of so many members has the variance of a Dirichlet product. Without failures, this is the number of all members.
+    Times of events are exact, not rounded to sample times.
 
     Arrays of the estimate, in addition to lower and upper, at k sample times:
 
     * value (k,): the probability; survival is 1 - value.
-    * alone (k,): Kaplan & Meier's estimate (1958), in which other events also censor: the probability if no other event
-      stopped members. It assumes that the stopped members would have continued like the others. No run can confirm this
-      assumption, and it rarely holds (a vehicle that surfaces does not sink). Interval: alone_lower, alone_upper.
+    * alone (k,): Kaplan & Meier's estimate (1958) of the probability if no other event stopped members. Members that
+      other events stop are censored, as if they had continued like the others. No run can confirm this assumption, and
+      it rarely holds (a vehicle that surfaces does not sink). Interval: alone_lower, alone_upper.
     * fraction (k,): members that have ended with the outcome, as a fraction of all members, including failed members;
       fraction_lower, fraction_upper: Wilson's interval.
     * ended, otherwise, failed (k,): numbers of members that have ended by each time. `ended`: with the outcome;
       `otherwise`: in any other way; `failed`: those of `otherwise` that failed.
     * count (k,): number of members at risk at each time.
-    * end_time (levels,) [s]: time by which each of these fractions of the members has the outcome; infinite if never.
+    * end_time (levels,) [s]: time by which each fraction in `levels` of the members has the outcome; infinite if never.
       end_time_lower, end_time_upper follow from the interval of value.
 
     Args:

@@ -116,10 +116,10 @@ class FirstPassage(Condition, Counted):
     The probability is Aalen & Johansen's estimate. A member that an event stops before the condition holds never
     passes. With stopped="left_out" this member is censored: its chance of passing later is assumed to equal the other
     members' chance. A member that fails before it passes counts until its last valid sample. The estimate is NaN if no
-    member is known at the first sample. If no member fails, the probability is the fraction of all members. Interval:
-    Wilson's, for the number of members at which a simple fraction has the variance of a beta product (Fay, Brittain &
-    Proschan 2013). This accounts for few members at risk. Once no member is at risk, the upper end of the interval
-    assumes that all lost members pass.
+    member is valid at the first sample. If no member fails, the probability is the fraction of all members. The
+    interval is Wilson's for an equivalent number of members: a simple fraction of so many members has the variance of a
+    beta product (Fay, Brittain & Proschan 2013). This accounts for few members at risk. Once no member is at risk, the
+    upper end of the interval assumes that all lost members pass.
 
     If the condition holds at a sample but not at the sample before, the member passes where the straight line between
     the two values crosses the limit. For a quantity that is true or false, the member passes at the sample. A condition
@@ -133,7 +133,7 @@ class FirstPassage(Condition, Counted):
     * stopped (k,): number of members that an event stops in this interval without having passed.
     * count (k,): number of members at risk of passing in this interval.
     * censored: number of members that ran to the end and did not pass.
-    * passage_time (levels,) [s]: time by which each of these fractions of the members has passed; infinite if never.
+    * passage_time (levels,) [s]: time by which each fraction in `levels` of the members has passed; infinite if never.
       passage_time_lower, passage_time_upper follow from the interval of value.
 
     Args:

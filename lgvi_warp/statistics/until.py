@@ -35,10 +35,10 @@ class Until:
 
     The run stops at the end of a block. Intervals are checked in the order of the blocks, so neither the number of
     members nor any bit of the result depends on threads. If the design has replicates, intervals are checked when the
-    number of members is a power of two. docs/guide/statistics_accuracy.md gives the effect on the intervals' coverage.
+    number of members is a power of two. docs/guide/statistics_accuracy.md gives the effect of this rule on coverage.
 
     Args:
-        statistic: name of one of the run's statistics, as the command prints it: "mean position"; of one component,
+        statistic: name of one of the run's statistics, as the terminal prints it: "mean position"; of one component,
             "mean position[2]"; of one level, "quantiles depth 0.95" or "quantiles position[2] 0.95"; or of one entry of
             a covariance, "covariance position[0], position[2]". A mean that the run does not compute is added.
         half_width: largest allowed half width of the interval, in the statistic's unit, above 0. The interval of every

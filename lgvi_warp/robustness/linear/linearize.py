@@ -34,7 +34,7 @@ class LinearModel:
     """Discrete linear model of deviations from a motion: x' = A x + B u, y = C x + D u.
 
     x: n states; x': x one period later; u: m inputs; y: the first 12 states: position [m, inertial axes], rotation
-    vector [rad], velocity [m/s], angular velocity [rad/s] (body axes). The rest is memory of actuators and parts.
+    vector [rad], velocity [m/s], angular velocity [rad/s] (body axes). Other states are memory of actuators and parts.
 
     Attributes:
         A: state matrix (n, n).
@@ -148,7 +148,7 @@ def linearize(
         period: Period of a plant [s]. Default: the controller's period; without a controller, the step.
         method: As in `lw.solve`. Default: the method of the trim; without a trim, the scene's method.
         h: Step [s]. Default: the step of the trim; without a trim, the scene's step.
-        step: Increment of the central differences; above a size of 1, a fraction of the changed number. Default 1e-5.
+        step: Increment of the central differences; for |number| > 1, as a fraction of |number|. Default 1e-5.
 
     Returns:
         The model.

@@ -86,9 +86,9 @@ class Margins(Saved):
 
     Attributes:
         loop: key of the law; "all laws" for the whole controller.
-        values: margins by name, each (n,), by eigenvalues. "gain_lower", "gain_upper": smallest and largest factor on
-            the demand that the loop tolerates; 0 and infinite if it tolerates all tried factors. "delay": largest
-            tolerated extra delay [s], in whole steps; infinite if it tolerates the longest tried delay. "phase",
+        values: margins from eigenvalues, name -> (n,). "gain_lower", "gain_upper": smallest and largest factor on the
+            demand that the loop tolerates; 0 and infinite if it tolerates all tried factors. "delay": largest tolerated
+            extra delay [s], in whole steps; infinite if it tolerates the longest tried delay. "phase",
             "phase_frequency": phase margin [rad] and its crossover frequency [rad/s]; infinite and NaN if no gain
             crosses 1. "disk": disk margin of all components of the demand at once; the factors ("disk_gain_lower",
             "disk_gain_upper") and phases ("disk_phase" [rad]) that it guarantees; its frequency ("disk_frequency"
@@ -286,10 +286,10 @@ def margins(
     and commands shrinks from the second to the last third of the run, and is smaller than in the first third. In the
     last third no command is at its limit, the body stays within 10 `tilt` of the motion, and it turns by less than 10
     `tilt` within a period. If the swing shrinks only slightly, a run 1.5 times as long decides. Tracking errors are not
-    examined: slow integral action hides small fast limit cycles. If the loop gains and loses stability several times,
-    the margin is one of these changes.
+    examined: slow integral action hides small fast limit cycles. If the loop gains and loses stability several times as
+    the factor or delay grows, the margin is at one of these changes.
 
-    Noise, drift and, by eigenvalues, rounding of sensors are set to 0, their mean. Faults are off; see `messages`.
+    Noise and drift of sensors are set to 0, their mean; by eigenvalues, so is rounding. Faults are off; see `messages`.
 
     The phase margin is the smallest phase shift, lag or lead, of all components of the law's demand that makes the loop
     unstable. For one component it follows from the crossovers of the gain; for several, from the crossovers of the

@@ -39,7 +39,7 @@ class Tuned(Saved):
     Attributes:
         parameters: tuned numbers by name.
         before: the scene's own values of these numbers.
-        cost: risk over the members of the search; optimistic, since the numbers were chosen with these members.
+        cost: risk over the members of the search. It is optimistic, since the numbers were chosen with these members.
         fresh_cost: risk over fresh members, which the search did not use; NaN if no fresh members can be drawn.
         fresh_before: risk of the scene's own numbers, over the same fresh members.
         of: name of the quantity that is the cost.
@@ -47,13 +47,13 @@ class Tuned(Saved):
         members: number of members that the search used.
         fresh: number of fresh members.
         at_bounds: names of the tuned numbers that lie at their bounds; these bounds may be too narrow.
-        restarts: (r,), lowest risk found by each of the r evolutions.
+        restarts: (r,), lowest risk found by each of the r runs of differential evolution.
         runs: number of members that were run.
         units: unit of the quantity and of each tuned number, by name.
         constraints: text, such as "disk above 0.5" -> dict. "worst": value of the member of the search that is closest
             to the bound or violates it most; "fresh_worst": the same for fresh members; "fresh_before": the same for
             fresh members with the scene's own numbers; "fresh_broken": number of fresh members that violate the bound.
-            A value is NaN if some member has none.
+            A value is NaN if a member has no value.
         messages: notes for the user on effects that margins in the constraints neglect.
         feasible: True if all members of the search satisfy all constraints.
     """
@@ -175,7 +175,7 @@ def tune_gains(
             or `lw.metrics.CVaR(0.05)`, the mean cost of the worst 5 %. A member that fails has an infinite cost.
         budget: Number of members that the search may run, over all candidates; 100,000 by default.
         fresh: Number of fresh members; None, the default: four times the number of members of the fleet.
-        restarts: Number of independent evolutions; 1 by default.
+        restarts: Number of independent runs of differential evolution; 1 by default.
         seed: Seed of the search; 0 by default.
         constraints: Bounds that every member must satisfy: on a margin of all laws together, "disk above 0.5", or of
             one law, "phase heading_pid above 0.6", with the names of `lw.linear.margins`; on a metric, "overshoot depth

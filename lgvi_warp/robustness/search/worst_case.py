@@ -35,7 +35,7 @@ class WorstCase(Saved):
 
     Attributes:
         parameters: values of the searched numbers for this member, by name.
-        value: quantity of this member; infinite if the member failed. The search ends at the first failed member.
+        value: the quantity for this member; infinite if it failed. The search ends at the first failed member.
         of: name of the quantity.
         worst: "largest" or "smallest": which values of the quantity count as worst.
         at_bounds: name of a number -> bound at which the number lies: "low", "high", or "" for neither.
@@ -124,7 +124,7 @@ def worst_case(
     Differential evolution runs several times from different starts; each generation is an ensemble. The corners of the
     box of bounds follow, if they are few, then a local search from the worst point. The rest of the budget goes to
     Sobol points over the whole box and local searches from the worst of them. All members get the same noise. A peak
-    may be missed; `unseen` of the answer bounds the fraction of the box that it fills, with probability 95 %.
+    may be missed; with probability 95 %, it fills at most the fraction `unseen` of the box.
 
     Args:
         fleet: A Scene, or an Ensemble, whose scene is used. Numbers that are not searched keep the scene's values.
@@ -134,7 +134,7 @@ def worst_case(
             metric, as in `lw.sweep`: "overshoot depth", lw.metrics.SettlingTime("depth", within=0.5).
         worst: Worst value: "largest", the default, or "smallest". A failed member is worst of all and ends the search.
         budget: Number of members that may be run; 20,000 by default.
-        restarts: Number of evolutions; 3 by default. A small budget allows fewer.
+        restarts: Number of runs of differential evolution; 3 by default. A small budget allows fewer runs.
         seed: Seed of the search; 0 by default.
         progress: True shows a bar or lines, as in lw.solve; a function is called with the used fraction of the budget.
             None, the default: nothing is shown.

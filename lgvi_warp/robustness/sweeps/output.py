@@ -60,7 +60,7 @@ class Sweep(SweepTable):
         worst: The worst members of all cells.
         causes: Inputs that explain success or a metric.
         values: A metric of all members of a cell.
-        survival: Probability that a member neither failed nor was stopped by each time.
+        survival: Probability that a member still runs at each time.
         members: Indices of members that fail to pass, or of members that pass.
         again: Run members of a case again and save their samples.
         rare: Probability of a rare failure of a case.
@@ -84,9 +84,9 @@ class Sweep(SweepTable):
     ) -> list[PairedComparison]:
         """Compare two cases on the same members: their success and each metric, at each point of the grid.
 
-        Success: difference of paired proportions, with Tango's interval and McNemar's exact test. Metrics: paired t
-        test, or bootstrap for a quantile, over members with finite numbers that failed in neither case. Holm's method
-        corrects the p-values for the number of comparisons. See docs/guide/is_my_controller_robust.md.
+        Success is compared by the difference of paired proportions (Tango's interval, McNemar's exact test). A metric
+        is compared by a paired t test, or for a quantile by bootstrap, over members with finite numbers that failed in
+        neither case. Holm's method corrects the p-values for their number. See docs/guide/is_my_controller_robust.md.
 
         Args:
             first: name of a case.
@@ -119,7 +119,7 @@ class Sweep(SweepTable):
         return corrected([of_kind(f"rows[{i}]", row, *kind) for i, row in enumerate(rows)], self.confidence)
 
     def rare(self, case: str, at: Mapping[str, Any] | None = None) -> RareEvent:
-        """Return the rare failure of a case for which it was requested: the probability that a member does not pass.
+        """Return the rare failure of a case that requested it: the probability that a member does not pass.
 
         The answer lists at most about 4,000 failing members. `compare_rare` runs these members in other cases.
 
@@ -182,7 +182,7 @@ class Sweep(SweepTable):
         return ranks(self, at)
 
     def worst(self, count: int = 20, by: str | None = None, case: str | None = None) -> list[dict[str, Any]]:
-        """Find the worst members of all cells: first failed members, the earliest first, then the largest metrics.
+        """Find the worst members of all cells: failed members (the earliest first), then members of largest metric.
 
         Args:
             count: number of members; by default 20.

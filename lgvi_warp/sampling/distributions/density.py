@@ -23,7 +23,7 @@ AT_ONCE = 4_000_000
 
 @dataclass(frozen=True, eq=False)
 class KernelDensity(JointLaw):
-    """Gaussian kernel density of draws, such as posterior draws: of one number, or of several numbers jointly.
+    """Gaussian kernel density of draws, such as posterior draws, of one number or of several numbers jointly.
 
     Its values are absolute: the scene's own value is not used. The density is the mean of normal distributions
     (kernels) about the draws. A level is a coordinate in the unit cube. For one number, the value rises with its level,

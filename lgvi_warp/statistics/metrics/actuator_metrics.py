@@ -67,13 +67,13 @@ _ALL = {name: all_of(name) for name in CHANNELS}
 
 @dataclass(frozen=True, eq=False)
 class Effort(OfChannels):
-    """Metric: integral over time of |command|, summed over channels [unit of the commands, s].
+    """Metric: integral over time of |command| or |position|, summed over channels [unit of the commands times s].
 
-    Each value counts until the next tick. This is exact for commands, which are held between ticks.
+    Each value is taken as constant until the next tick. For commands this is exact: they are held between ticks.
 
     Args:
-        of: "command" (the default): commands after faults, before delays; "actuator": positions after delay, fault,
-            limit and lag; or one channel, "command[2]".
+        of: "command" (the default): commands after faults and before delays; "actuator": actuator positions after
+            delay, fault, limit and lag; or one channel, such as "command[2]".
     """
 
     type: ClassVar[str] = "effort"
@@ -86,10 +86,10 @@ class Effort(OfChannels):
 
 @dataclass(frozen=True, eq=False)
 class Travel(OfChannels):
-    """Metric: travel of the actuators, the sum of |change from tick to tick| over channels [unit of the commands].
+    """Metric: travel of the actuators: sum of |change per tick| over all ticks and channels [unit of the commands].
 
     Args:
-        of: "actuator", the default: actual positions after delay, fault, limit and lag; "command"; or one channel.
+        of: "actuator" (the default) or "command", as in `Effort`; or one channel, such as "actuator[2]".
     """
 
     type: ClassVar[str] = "travel"
@@ -111,7 +111,7 @@ def _saturated(samples: Fields, members: Members) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class SaturationShare(OfOne, Total):
-    """Metric: fraction of a member's running time during which some command is at or beyond its limit [1].
+    """Metric: fraction of a member's running time during which at least one command is at or beyond its limit [1].
 
     The limit is the parameter `limit` of the term that receives the command. A term without a limit never saturates.
 
@@ -147,10 +147,10 @@ class ActuatorEnergy(OfOne, Total):
     """Metric: mechanical energy of the actuators [J], the integral over time of the |power| of their wrench.
 
     The power is the product of `exerted` with velocity and angular velocity. `exerted` is the actuators' wrench after
-    limits, lags, the loss by the advance speed, and all faults, known to the controller or not. Between ticks the
-    trapezoidal rule applies. Without lags, limited rates and delays, the wrench of a tick is held until the next tick.
-    The losses of motors and propellers are not included. `ElectricalEnergy` includes them, if the scene has an energy
-    account.
+    limits, lags, the loss of thrust due to the advance speed, and all faults, even faults unknown to the controller.
+    The trapezoidal rule integrates the power between ticks. Without lags, limited rates and delays, the wrench is
+    constant between ticks. Losses of motors and propellers are not included. `ElectricalEnergy` includes them, if the
+    scene has an energy account.
 
     Args:
         of: "exerted", the default.
@@ -179,8 +179,8 @@ class ActuatorEnergy(OfOne, Total):
 class ElectricalEnergy(OfOne, Total):
     """Metric: electrical energy that a member uses [J], from the account of `lw.terms.EnergyUse`.
 
-    It counts from the first to the last tick, with the hotel load and all losses that the terms define. In a sweep over
-    a scene with this account, "energy" also names this metric.
+    The energy from the first to the last tick counts, with the hotel load and all losses that the terms define. In a
+    sweep over a scene with this account, "energy" also names this metric.
 
     Args:
         of: "energy_used", the default.
@@ -234,13 +234,13 @@ class TickSamples(dict[str, np.ndarray]):
 class CustomMetric(Metric):
     """Custom metric: a function of your own that is called at each tick for a block of n members.
 
-    The function is called as function(state, tick). `state` is None at the first tick, then the value that the function
-    returned at the tick before. `tick` has the samples of the n members by name, such as tick["position"] (n, 3), and
-    tick.t, tick.dt [s]: the time, and the time since the last tick. The function returns numbers (n,), or (m, n) for m
-    numbers of each member. When a member stops or fails, its state no longer changes.
+    The function is called as function(state, tick). `state` is None at the first tick; later it is the value that the
+    function returned at the tick before. `tick` has the samples of the n members by name, such as tick["position"] (n,
+    3), the time tick.t [s], and the time since the last tick, tick.dt [s]. The function returns numbers (n,), or (m, n)
+    for m numbers of each member. When a member stops or fails, its state no longer changes.
 
     Args:
-        of: the function; the metric has its name.
+        of: the function; the metric takes the function's name.
         fields: names of the samples that the function reads, as for lw.SaveAt.
         last: function that computes the metric (n,) from the last state; by default the metric is the last state.
         unit_of: unit of the metric, a text; by default "1".

@@ -29,7 +29,7 @@ FIELDS = ("position", "attitude", "velocity")
 
 @dataclass(frozen=True, eq=False)
 class DockContact(Metric):
-    """Metric: one number of a member's first passage through the plane of its dock, within the mouth.
+    """Metric: one number of a member's first passage through the plane of its dock, within the radius of the mouth.
 
     A guidance `lw.control.Docking` defines the dock. Between two ticks the path is the cubic through their positions
     and velocities. A member that did not dock has no number (NaN), and is left out of statistics.

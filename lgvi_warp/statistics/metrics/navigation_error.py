@@ -27,8 +27,8 @@ UNITS = {"end": "m", "largest": "m", "percent": "%"}
 class NavigationError(Metric):
     """Metric: size of a member's `navigation_error`, the estimated minus the true position.
 
-    "percent" is how manufacturers state the error of logs and inertial systems: the error at the end divided by the
-    distance travelled over ground, by straight lines between ticks. It is NaN for a member that does not move.
+    Manufacturers of logs and inertial systems state the error as in "percent": the error at the end divided by the
+    distance travelled over ground, along straight lines between ticks. It is NaN for a member that does not move.
 
     Args:
         of: "end", the default: error at the member's last tick [m]; "largest": largest error over all ticks of this run

@@ -92,7 +92,7 @@ class OfStep(OfCourse):
 
 @dataclass(frozen=True, eq=False)
 class Overshoot(Largest, OfStep):
-    """Metric: largest distance of a member beyond its goal [unit of the quantity, or % of the step]; 0 if not beyond.
+    """Metric: largest distance of a member beyond its goal [unit of the quantity, or % of the step]; at least 0.
 
     Args:
         percent: True gives the metric in percent of the step, and NaN if the step is 0; by default False.
@@ -177,8 +177,8 @@ class Peak(Overshoot):
 class RiseTime(OfCourse):
     """Metric: rise time of a member, from 10 % to 90 % of its step [s].
 
-    It lasts from the first tick at which at least 10 % of the step is done to the first tick at which at least 90 % is
-    done. It is infinite if a member never reaches 90 %.
+    The rise time lasts from the first tick at which at least 10 % of the step is done to the first tick at which at
+    least 90 % is done. It is infinite if a member never reaches 90 %.
 
     Args:
         limits: the two fractions of the step; by default (0.1, 0.9).
@@ -217,11 +217,11 @@ class RiseTime(OfCourse):
 class SettlingTime(OfCourse):
     """Metric: time after which a member stays within a band about its goal [s].
 
-    It is the time of the first tick from which on |goal - actual value| <= within at every tick of the member. It is
-    infinite for a member that is outside the band at its last tick.
+    It is the time of the earliest tick such that |goal - actual value| <= within at this tick and at all later ticks of
+    the member. It is infinite for a member that is outside the band at its last tick.
 
     Args:
-        within: half width of the band, in the unit of the quantity; by default 2 % of each member's step.
+        within: half width of the band, in the unit of the quantity; by default 2 % of the member's step.
     """
 
     type: ClassVar[str] = "settling_time"
@@ -300,7 +300,7 @@ class MaxError(Largest, OfTracking):
 class CrossTrack(MaxError):  # noqa: N818  (no exception)
     """Metric: largest horizontal distance from the line through the desired position along the desired velocity [m].
 
-    Without a desired velocity, it is the largest distance from the desired position.
+    Where the desired horizontal velocity is 0, the horizontal distance from the desired position counts instead.
 
     Args:
         of: "cross_track", the default.
@@ -324,7 +324,7 @@ class OverTime(Total, OfTracking):
 
 @dataclass(frozen=True, eq=False)
 class IAE(OverTime):
-    """Metric: integral of |e| over time [unit of the quantity, s]; e is the desired minus the actual value.
+    """Metric: integral of |e| over time [unit of the quantity times s]; e is the desired minus the actual value.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -347,7 +347,7 @@ class IAE(OverTime):
 
 @dataclass(frozen=True, eq=False)
 class ISE(OverTime):
-    """Metric: integral of e^2 over time [unit of the quantity squared, s]; e is the desired minus the actual value."""
+    """Metric: integral of e^2 over time [unit of the quantity squared times s]; e: desired minus actual value."""
 
     type: ClassVar[str] = "ise"
     form: ClassVar[str] = "{0}^2 s"
@@ -356,7 +356,7 @@ class ISE(OverTime):
 
 @dataclass(frozen=True, eq=False)
 class ITAE(OverTime):
-    """Metric: integral of t |e| over time t [unit of the quantity, s^2]; e is the desired minus the actual value."""
+    """Metric: integral of t |e| over time t [unit of the quantity times s^2]; e: desired minus actual value."""
 
     type: ClassVar[str] = "itae"
     form: ClassVar[str] = "{0} s^2"
@@ -365,7 +365,7 @@ class ITAE(OverTime):
 
 @dataclass(frozen=True, eq=False)
 class RMSError(ISE):
-    """Metric: root mean square of e over time (|e| for one tick) [unit of the quantity]; e: desired minus actual."""
+    """Metric: root mean square of e over time [unit of the quantity]; e is the desired minus the actual value."""
 
     type: ClassVar[str] = "rms"
     form: ClassVar[str] = "{0}"

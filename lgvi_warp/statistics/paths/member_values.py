@@ -18,11 +18,11 @@ from lgvi_warp.statistics.values.values import Values
 
 @dataclass(frozen=True, eq=False)
 class MemberValues(Statistic):
-    """The numbers of all members, in the order of the members: eight bytes per member, component and row.
+    """The numbers of all members, in the order of the members. They take 8 bytes per member, component and row.
 
-    Use it mostly in `then` of another statistic, which has one row: lw.metrics.Overshoot("depth",
-    then=[lw.statistics.Mean(), lw.statistics.MemberValues()]). The values of a metric include the numbers of failed
-    members; otherwise the number of a member that is left out is NaN. There is no interval.
+    Use this statistic mostly in `then` of a statistic that has only one row: lw.metrics.Overshoot("depth",
+    then=[lw.statistics.Mean(), lw.statistics.MemberValues()]). For a metric, the values include failed members. For
+    other statistics, the value of a member that is left out is NaN. There is no interval.
 
     Arrays of the estimate, for k rows (sample times), d components and n members:
 
@@ -33,8 +33,8 @@ class MemberValues(Statistic):
         of: A quantity, such as "depth" or "position[2]", a function of (samples, members), or a list of these
             (see lw.statistics.Quantity).
         name: Key of the estimate in the result; by default the type and the quantity, as in "mean position".
-        stopped: After an event stopped a member, "held" counts the member with its last state; "left_out" leaves it
-            out.
+        stopped: After an event stopped a member, "held" (default) counts the member with its last state; "left_out"
+            omits the member.
 
     Examples:
         >>> import lgvi_warp as lw

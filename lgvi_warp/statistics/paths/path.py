@@ -153,7 +153,7 @@ class PathTime(OfPath, Condition):
 
     Args:
         above: lower limit, one number or one for each component, in the quantity's unit.
-        below: upper limit, in the same form. With both limits, the time between them counts.
+        below: upper limit, in the same form. With both limits, the time spent between them counts.
     """
 
     type: ClassVar[str] = "path_time"

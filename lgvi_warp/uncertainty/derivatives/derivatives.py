@@ -44,9 +44,9 @@ def derivatives(
 ) -> Derivatives:
     """Compute derivatives of a run's outputs with respect to numbers of the scene, each with an error estimate.
 
-    Each member runs together with copies that have the same noise, and one number changed by one of several increments.
-    The differences are extrapolated, and the increments that agree best are used. A quantity that jumps or changes in
-    steps has no derivative: the answer gives the reason, and the entries are NaN.
+    Each member runs together with copies that have the same noise. In a copy, one number is changed by one of several
+    increments. The differences are extrapolated, and the increments that agree best are used. A quantity that jumps or
+    changes in steps has no derivative: the answer gives the reason, and its entries are NaN.
 
     Args:
         fleet: A Scene, whose [ensemble] is ignored; or an Ensemble, for derivatives of each member.

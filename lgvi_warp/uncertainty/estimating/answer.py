@@ -35,7 +35,7 @@ class Estimated(Summarized, Saved):
         seconds: processor time of all runs, including the pilot, without compiling [s].
         pilot_seconds: processor time of the pilot [s].
         plain_seconds: predicted processor time of plain Monte Carlo in this setting, for the same error [s].
-        own_seconds: the same prediction at the scene's own step; None if the scene has no step.
+        own_seconds: predicted time of plain Monte Carlo at the scene's own step [s]; None if the scene has no step.
         rivals: estimator -> predicted cost of plain Monte Carlo divided by the cost of this estimator, in this setting.
         messages: notes for the user.
         recipe: data with which lw.estimate(fleet, of, recipe=...) runs the same members again, bit-identically: seed,

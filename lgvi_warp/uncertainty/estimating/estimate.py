@@ -75,17 +75,17 @@ def estimate(
     Choices use counted costs (steps times force evaluations per step), so the same seed gives the same answer, to the
     bit, on any number of threads. `recipe` of the answer stores the choices, so that the same members can run again.
 
-    A sample of n members can miss up to a fraction 3 / n of all members that behaves differently. To estimate the
-    effect of this fraction, 512 to 2,048 members spread over all inputs, and members with extreme inputs, are run. A
-    message gives the fraction of members that a mean may have missed. Rare values of a Choice are separate strata.
+    A sample of n members can miss a group that behaves differently, up to a fraction 3 / n of all members. To estimate
+    the effect of such a group, 512 to 2,048 members spread over all inputs, and members with extreme inputs, are run. A
+    message gives the fraction of members that a mean may have missed. Rare values of a Choice form separate strata.
 
     Args:
-        fleet: the ensemble, or a Scene with one. Members are drawn anew from its distributions, without its sampling.
+        fleet: the ensemble, or a Scene with one. New members are drawn from its distributions; its sampling is unused.
         of: statistic to estimate, at the end of the run: a text such as "mean position[0]", "depth above 3", "outcome
             floor" or "max(depth)"; lw.statistics.Mean, Exceedance, Outcome, FirstPassage or Quantiles with one level;
             or a metric such as lw.metrics.ITAE("depth").
         error: requested root mean square error from sampling and bias together, in the unit of the statistic; above 0.
-        relative_error: requested error divided by the statistic's value; instead of `error`.
+        relative_error: requested error divided by the statistic's value; give it instead of `error`.
         t1: end time [s]. Default: run.duration of the scene.
         risk: for a quantity or a metric: "mean" (the default), a quantile's level, such as 0.95, or lw.metrics.CVaR(0.05).
         cheaper: scenes that cost less and behave similarly, as tables of changed numbers, such as {"controller.delay":

@@ -73,7 +73,7 @@ class Footprint(Saved):
             are left out; a message gives their number.
         covariance: Covariance of the same positions (2, 2) [m2].
         regions: The regions with shares of 50, 90, 95 and 99 %, if there are enough members for them.
-        growth: For 1/8, 1/4, 1/2 and all members: (members; area of the 95 % region, low, high) [m2].
+        growth: For 1/8, 1/4, 1/2 and all members: (number of members, area of the 95 % region, low, high) [m2].
         origin: Latitude and longitude of the axes' origin [deg]; None if the scene does not give them.
         places: North and east of some members (m, 2) [m], for figures; at most 1,000, chosen at random.
         messages: Notes for the user.

@@ -61,9 +61,9 @@ def run_answer(result: Result) -> str:
 def footprint(result: Result, at: str | float = "end") -> Footprint:
     """Find the smallest regions that contain given shares of the members' positions, and their areas.
 
-    The shares are 50, 90, 95 and 99 %. In a region the kernel density of the positions exceeds a level that this share
-    of new members would exceed, so a region may have several parts and holes. Members that failed or never reach the
-    event have no position; `lacking` of the answer counts them.
+    The shares are 50, 90, 95 and 99 %. A region is the area where the kernel density of the positions exceeds a level,
+    chosen so that this share of new members would lie in it. It may have several parts and holes. Members that failed
+    or never reach the event have no position; `lacking` of the answer counts them.
 
     Args:
         result: A result with positions, in memory or in a store.

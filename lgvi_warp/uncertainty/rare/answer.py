@@ -36,7 +36,7 @@ class RareEvent(Saved):
         interval: (lower, upper), 95 % interval, by Student's t for the logarithm of the probability.
         relative_error: relative standard error of the probability.
         estimator: "importance", "subset", "plain" or "splitting".
-        members: number of members run, by setting: "scene" and the entries of `cheaper`; with splitting, in whole runs.
+        members: number of members run, by setting: "scene" and the entries of `cheaper`; with splitting, as whole runs.
         failing: the m failing members, a `Table` for lw.Ensemble(scene, sampling=found.failing); None if only noise
             varies. With splitting a member may occur several times, with different noise.
         normals: (m, d), standard normal scores of the d varied numbers of the failing members, in the order of `moved`.
@@ -58,15 +58,15 @@ class RareEvent(Saved):
         seconds: time of all runs of members in this call [s].
         messages: notes for the user.
         provenance: scene, distributions, settings, versions and machine.
-        paths: with splitting, (times (j + 1,) [s], indices (j,)) of each failing member: between successive times it
-            has the noise of this index and of the call's seed, as in `run.states(final, indices=, seed=)`.
+        paths: with splitting, (times (j + 1,) [s], indices (j,)) of each failing member: between two times the member
+            has the noise of the index between them and of the call's seed, as in `run.states(final, indices=, seed=)`.
         moved_size: name -> mean distance of failing members from the middle [standard deviations]; all members: 0.80.
         moved_spread: name -> standard deviation of failing members divided by that of all members.
-        moved_z: name -> z-score of the clearest of these three differences from all members; significant from 4.5 on.
+        moved_z: name -> largest z-score of the three differences above from all members; significant from 4.5 on.
         by_condition: text of each condition, "any" or "all" -> (probability, lower, upper) over the whole run; empty
             for one condition, or if a status is a condition.
-        ancestors: (m,), first-level ancestor of each failing member; with splitting, its run. Members that share an
-            ancestor are dependent.
+        ancestors: (m,), first-level ancestor of each failing member; with splitting, its independent run. Members that
+            share an ancestor are dependent.
     """
 
     study: ClassVar[str] = "rare"

@@ -78,8 +78,8 @@ def rare_event(
 
     Args:
         fleet: A Scene or an Ensemble; its distributions in `vary` and its noise make the members differ.
-        limit: The event: a quantity, such as "max(depth) - 40.0", or a function of a Result, positive in the event;
-            conditions as in a sweep, {"peak depth": {"above": 12.0}}, any of which suffices; or an event's name.
+        limit: The event: a quantity, such as "max(depth) - 40.0", or a function of a Result, positive if the event
+            happens; conditions as in a sweep, {"peak depth": {"above": 12.0}}: one suffices; or an event's name.
         relative_error: Target relative standard error of the probability, 0.005 to 0.5; 0.1 by default.
         by: "chains", the default, or "splitting", for a scene with noise and an event that develops over time: a
             quantity at the end, its max or min over the path, "max_error depth", "iae depth", or an event of the scene.

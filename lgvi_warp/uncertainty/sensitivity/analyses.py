@@ -54,9 +54,9 @@ def sobol(
     Args:
         scene: a Scene, with distributions in its [ensemble] or in `vary`; or an Ensemble, for its scene, vary and seed.
         of: one or several quantities of interest: "position[2]", "depth" (at the end), "max(energy)" (over the path),
-            "outcome floor", a lw.statistics.Quantity, or a function from a Result to an array (n,) or (n, m).
-        samples: number N of base points, a multiple of `replicates`, best a power of two. For d factors, N (2 d + 2)
-            members are run; without second_order, N (d + 2). Default 1024.
+            "outcome floor", a lw.statistics.Quantity, or a function that turns a Result into an array (n,) or (n, m).
+        samples: number N of base points: a multiple of `replicates`, preferably a power of two. For d factors, N (2 d +
+            2) members are run; without second_order, N (d + 2). Default 1024.
         vary: name -> distribution. Default: the scene's or the ensemble's distributions.
         seed: seed of the design. Default: the scene's or the ensemble's seed.
         second_order: True also estimates second-order indices of pairs. Default True.
@@ -176,7 +176,7 @@ def morris(
         scene: a Scene, with distributions in its [ensemble] or in `vary`; or an Ensemble, for its scene, vary and seed.
         of: one or several quantities of interest, as in `sobol`.
         samples: number N of paths; N (d + 1) members are run for d factors. Default 64.
-        levels: even number of levels of each factor. A step of a path moves one factor by half the levels. Default 4.
+        levels: even number of levels of each factor. A step moves one factor by half of its levels. Default 4.
         vary: name -> distribution. Default: the scene's or the ensemble's distributions.
         seed: seed of the design. Default: the scene's or the ensemble's seed.
         confidence: level of the bootstrap's intervals, between 0 and 1. Default 0.95.

@@ -54,12 +54,12 @@ class GivenDataIndices(Indices):
 def given_data(
     result: Result | str | os.PathLike[str], of: OfInterest | Sequence[OfInterest], *, confidence: float = 0.95
 ) -> GivenDataIndices:
-    """Estimate first-order indices from a finished run, for every number that varied in it, also at the start.
+    """Estimate first-order indices from a finished run, for every number that varied in it or at its start.
 
-    No special design is needed. For each input, the members are divided into bins. The index is the fraction of the
-    variance between the bins' means, minus the fraction expected by chance. The interval follows from the noncentral F
-    distribution, and is wider if the quantity is not normal. Interactions are not detected (see `lw.uq.sobol`). Inputs
-    should be independent: the common effect of correlated inputs counts for each of them.
+    No special design is needed. For each input, the members are divided into bins. The index is the variance of the
+    bins' means as a fraction of the whole variance, minus the fraction expected by chance. The interval follows from
+    the noncentral F distribution, and is wider if the quantity is not normal. Interactions are not detected (see
+    `lw.uq.sobol`). Inputs should be independent: the common effect of correlated inputs counts for each of them.
 
     Args:
         result: A result of `lw.solve`, `lw.open_run` or `lw.Result.load`, or the path of a store.

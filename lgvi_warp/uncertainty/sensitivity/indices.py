@@ -26,7 +26,7 @@ class Indices(Saved):
         quantities: labels of the quantities of interest (m,).
         mean: mean of the quantities over the design (m,) [their units].
         std: standard deviation of the quantities over the design (m,) [their units].
-        samples: number of base points or paths of the design that were used; for given data, of members.
+        samples: number of base points or paths of the design that were used; for given data, number of members.
         members: number of members that were run.
         failed: number of members that failed.
         confidence: level of the intervals; fields named ..._confidence hold the half widths of intervals.
@@ -181,7 +181,7 @@ class SobolIndices(Indices):
         total: fraction due to each factor with all its interactions (m, d) [1].
         total_confidence: half width of the interval of `total` (m, d).
         second: fraction due to each interaction of two factors (m, d, d) [1]; symmetric, NaN on the diagonal; or None.
-        second_confidence: half width of the interval of `second` (m, d, d), or None.
+        second_confidence: half width of the interval of `second` (m, d, d); None if not estimated.
     """
 
     first: np.ndarray
@@ -240,7 +240,7 @@ class SobolIndices(Indices):
 
 @dataclass(frozen=True, eq=False)
 class MorrisEffects(Indices):
-    """Elementary effects of d factors on m quantities, per whole range of the factor (side of the unit cube).
+    """Elementary effects of d factors on m quantities: change of a quantity per whole range of a factor.
 
     mu and sigma of a factor with several numbers, such as an attitude, are NaN, since a step moves all of its numbers.
 

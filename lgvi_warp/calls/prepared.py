@@ -111,10 +111,10 @@ class Prepared:
         xi: (n, m), float32 or float64, only for a run prepared with draws="given": standard normals that forces and
             sensors use instead of drawing them. `draws` lists the columns; lw.uq.draws_of(run, indices) returns the
             default draws.
-        seed: seed of the noise of forces and sensors, and of the drawn members, a whole number from 0; default the seed
-            of the ensemble.
-        indices: (n,), together with X, whole numbers from 0: each row has the noise of the member with this index in an
-            ensemble of this seed. Rows with the same index have the same noise. Default None for 0 to n - 1.
+        seed: seed of the noise of forces and sensors, and of the drawn members, a whole number from 0; default None:
+            the seed of the ensemble.
+        indices: (n,), only with X: whole numbers from 0. Each row has the noise of the member with this index in an
+            ensemble with this seed; rows with the same index have the same noise. Default None: 0 to n - 1.
         progress: True shows a bar or lines, as in lw.solve; a function is called with the finished fraction of the
             work, in [0, 1].
         Returns: The quantities: (n,) for a single number, (n, m) for several numbers; a `Result` if `of` is None.
@@ -358,7 +358,7 @@ def prepare(
         depths = run(X)                                    # X (n, 2), depths (n,)
 
     Args:
-        fleet: A Scene or an Ensemble. If `vary` is None, the ensemble (for a Scene its [ensemble]) names the numbers.
+        fleet: A Scene or an Ensemble. If `vary` is None, the ensemble (a Scene: [ensemble]) names the varied numbers.
         vary: Names of the numbers that vary, ["vehicle.mass", "start.position[2]"], or a mapping of names to
             distributions.
         of: One or several quantities of interest: "position[2]", "max(depth)", a Quantity, a function of a Result,

@@ -25,8 +25,8 @@ PLAIN, MOST = 1000, 1000
 def rare(found: RareEvent, *, figure: Any = None, path: FilePath | None = None) -> np.ndarray:
     """Draw the result of `lw.rare_event`: exceedance probabilities of the limit, and the inputs of failing members.
 
-    The first panel, drawn for subset simulation, shows the probability that the limit exceeds a value. The event is at
-    0; circles mark thresholds of levels. The second shows failing and all members in the two most changed inputs.
+    The first panel, drawn for subset simulation or splitting, shows the probability that the limit exceeds a value. The
+    event is at 0; circles mark thresholds. The second shows failing and all members in the two most changed inputs.
 
     Args:
         found: Result of `lw.rare_event`.
@@ -35,7 +35,7 @@ def rare(found: RareEvent, *, figure: Any = None, path: FilePath | None = None) 
         The axes, shape (panels,).
 
     Raises:
-        NothingToDraw: The event was sampled without subset simulation, and no number except noise varies.
+        NothingToDraw: The answer has no levels (as by plain sampling), and nothing but noise varies.
     """
     of_kind("found", found, "probability runs normals", "of lw.rare_event", "give what lw.rare_event returns")
     numbers = bool(found.moved) and len(found.normals) > 0

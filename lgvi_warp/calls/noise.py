@@ -100,21 +100,21 @@ def checked_indices(indices: Any, members: int | None = None) -> np.ndarray:
 def draws_of(run: Any, indices: Any = None, *, seed: int | None = None, members: int | None = None) -> np.ndarray:
     """Return the standard normals that the random number generator draws in a call without given draws.
 
-    Let `plain` be the same run prepared without draws="given". Then run(X, lw.uq.draws_of(run, indices)) and plain(X,
-    indices=indices) give the same bits; the last digit may differ with `rkmk4` in float32, or with width=1. Change the
+    Let `plain` be the same run prepared without draws="given". Then run(X, lw.uq.draws_of(run, indices)) gives the bits
+    of plain(X, indices=indices); the last digit may differ only with `rkmk4` in float32 and with width=1. Change these
     normals to study one gust, to set the first columns to Sobol points, or to move a Markov chain over the noise.
 
     Args:
         run: A run made by `lw.prepare`.
-        indices: (n,), whole numbers from 0: indices of the members whose draws are returned, in an ensemble of this
-            seed. Default None for 0 to members - 1.
-        seed: Seed of the noise, a whole number from 0; default the seed of the ensemble.
-        members: Number of members if `indices` is None; default as many as the ensemble has.
+        indices: (n,), whole numbers from 0: indices of the members whose draws are returned. Default None: the members
+            0 to members - 1.
+        seed: Seed of the noise, a whole number from 0; default None: the seed of the ensemble.
+        members: Number of members if `indices` is None; default None: all members of the ensemble.
 
     Returns:
         Standard normals (n, m); `run.draws` lists the columns. Their type is the type in which the kernel draws:
-        float32 for a run in float32 (also with compensation), otherwise float64. It is also float64 if a term draws its
-        initial value, as a stationary current does.
+        float32 for a run in "float32" or "float32_compensated", otherwise float64. If a term draws its initial value,
+        as a stationary current does, the type is always float64.
 
     Raises:
         SceneError: If arguments are at fault, or the normals would take more than 1 GB.

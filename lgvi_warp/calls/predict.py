@@ -53,7 +53,7 @@ PROBE_BYTES, SYNCS = 64_000_000, 4
 class Prediction:
     """Predicted time, memory and disk space of a run.
 
-    Blocks are written while others advance, so the slower of writing and advancing determines the time of the run.
+    Blocks are written while other blocks advance, so the slower of the two determines the time of the run.
     `str(prediction)` is a summary for a user.
 
     Attributes:
@@ -61,7 +61,7 @@ class Prediction:
         steps: Number of steps.
         blocks: Number of blocks.
         threads: Number of threads.
-        compile: Time to load the kernel in the trial [s]; near 0 if Warp's cache had it.
+        compile: Time to load the kernel in the trial [s]; near 0 if Warp's cache had the kernel.
         set_up: Time to set up all blocks [s].
         advance: Time of the steps of all members [s].
         write: Time to write the store [s].

@@ -45,11 +45,11 @@ class Prepared:
 
     Args:
         fleet: members that a call without X runs.
-        table: ensemble whose columns a call with X replaces; or the reason, as text, why calls cannot take X.
+        table: ensemble in which the numbers X of a call replace columns; or a text on why calls cannot take X.
         names: names of the columns of X.
         of: quantities of interest; empty if calls return whole results.
         runner: object that prepares and runs the calls.
-        levels: column of the unit cube for each name, if X holds levels; None if X holds values.
+        levels: for each name, its column in the unit cube if X holds probability levels; None if X holds values.
         refuse: whether a failed member is an error; otherwise its quantities are NaN.
         common_noise: whether all members have the same noise.
         noise: layout of the random draws of a call, and their source.
@@ -111,10 +111,10 @@ class Prepared:
         xi: (n, m), float32 or float64, only for a run prepared with draws="given": standard normals that forces and
             sensors use instead of drawing them. `draws` lists the columns; lw.uq.draws_of(run, indices) returns the
             default draws.
-        seed: seed of the noise of forces and sensors, and of the drawn members, a whole number from 0; default the seed
-            of the ensemble.
-        indices: (n,), together with X, whole numbers from 0: each row has the noise of the member with this index in an
-            ensemble of this seed. Rows with the same index have the same noise. Default None for 0 to n - 1.
+        seed: seed of the noise of forces and sensors, and of the drawn members, a whole number from 0; default None:
+            the seed of the ensemble.
+        indices: (n,), only with X: whole numbers from 0. Each row has the noise of the member with this index in an
+            ensemble with this seed; rows with the same index have the same noise. Default None: 0 to n - 1.
         progress: True shows a bar or lines, as in lw.solve; a function is called with the finished fraction of the
             work, in [0, 1].
         Returns: The quantities: (n,) for a single number, (n, m) for several numbers; a `Result` if `of` is None.
@@ -142,8 +142,8 @@ class Prepared:
     ) -> Any:
         """Run members from given states, or continue from the end of another run, for the duration of the prepared run.
 
-        By default row i of the states has the noise of member i in every call. A run that is continued continues its
-        noise, too. Calls that each continue the previous `result.final` give together the same bits as one long run.
+        By default row i of the states has the noise of member i in every call. A continued run also continues its
+        noise. Successive calls, each from the last `result.final`, together give the same bits as one long run.
 
         Args:
             position: (n, 3) [m], inertial axes; or `result.final` of another run, which replaces all four arrays.
@@ -347,8 +347,8 @@ def prepare(
     """Prepare a run that is called many times with different numbers X. By default row i of X has the noise of member i.
 
     Checks, compilation and everything else that does not depend on `vary` are done once. A call then takes little longer
-    than its kernel, and its results are bit-identical to those of `solve`. The function can be pickled and called from
-    threads.
+    than its kernel, and its results are bit-identical to those of `solve`. The prepared run can be pickled and called
+    from threads.
 
     Noise of forces and sensors is frozen: in every call row i of X has the noise that `solve` gives to member i with
     the ensemble's seed. Algorithms that move rows between calls, such as Markov chains, select the noise of each row by
@@ -358,14 +358,14 @@ def prepare(
         depths = run(X)                                    # X (n, 2), depths (n,)
 
     Args:
-        fleet: A Scene or an Ensemble. If `vary` is None, the ensemble (for a Scene its [ensemble]) names what varies.
+        fleet: A Scene or an Ensemble. If `vary` is None, the ensemble (a Scene: [ensemble]) names the varied numbers.
         vary: Names of the numbers that vary, ["vehicle.mass", "start.position[2]"], or a mapping of names to
             distributions.
         of: One or several quantities of interest: "position[2]", "max(depth)", a Quantity, a function of a Result,
             "outcome floor", or a metric as in `lw.sweep` ("iae depth", lw.metrics.ITAE("depth")). None, the
             default: calls return whole results.
-        method: As in `lw.solve`; by default it is chosen once, for `fleet`. Also h, t1, dtype, width, checks, on_failure,
-            device, threads, executor and scheduler are taken from the scene's [run] if they are omitted.
+        method: As in `lw.solve`. If omitted, it and h, t1, dtype, width, checks, on_failure, device, threads, executor
+            and scheduler are taken from the scene's [run]. A default method is chosen once, for `fleet`.
         h: Step [s].
         t1: End of the run [s].
         save: Samples to keep, as in `lw.solve`. With `of`, by default the samples that the quantities need.
@@ -387,7 +387,7 @@ def prepare(
         scheduler: Address of Dask's scheduler.
 
     Returns:
-        The function, a `Prepared`; its `names` name the columns of X.
+        The prepared run, a `Prepared` that is called as run(X); its `names` are the names of the columns of X.
 
     Raises:
         SceneError: If arguments are at fault; the message names every fault.

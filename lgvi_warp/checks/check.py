@@ -59,7 +59,7 @@ def check_law(
 ) -> LawReport:
     """Check a term's device code against its host code, at random states.
 
-    Each new law costs the compilation of one small kernel. A role is a device function of the law, such as `push`; all
+    The first check of a law compiles one small kernel. A role is a device function of the law, such as `push`; all
     roles are explained in docs/develop/add_a_force.md. These properties are checked for the roles that the law has:
 
     * All roles: numbers are finite, also at rest and along single axes. Lanes are independent, and the position of a
@@ -71,7 +71,7 @@ def check_law(
     * `damping`: nu . D nu >= 0 for its matrix D and every velocity nu. With `dissipative = False` the smallest power is
       reported, but a negative power is not a fault.
     * `push`, which Runge-Kutta methods use, adds the same force and torque as `damping` or `load`.
-    * `load`, damping of a hull that reads the water velocity along itself, passes the checks of `damping` in test water
+    * `load`, damping by water velocities at points along the hull, passes the checks of `damping` in test water
       that varies in space and time.
     * `follow`: the stored memory depends on the time alone, and is the same after two parts of an interval as after the
       whole interval.

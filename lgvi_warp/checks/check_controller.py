@@ -99,7 +99,7 @@ def check_controller(
 ) -> LawReport:
     """Check the device code of a part of a controller at random states of the motion, over four ticks for each member.
 
-    Each new part costs the compilation of two small kernels. These properties are checked:
+    The first check of a part compiles two small kernels. These properties are checked:
 
     * `packed` fills the fields that `params` names, and gives the same result in all axes that a method may choose.
     * Numbers are finite at random states, without a control error, with an error of half a turn, at rest, and with each

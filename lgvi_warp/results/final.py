@@ -39,7 +39,7 @@ def final_of(
 
 
 def to_file(final: Final) -> tuple[dict[str, np.ndarray], str]:
-    """Convert final states to arrays and a text; states, status and parameters are omitted, since the result has them."""
+    """Convert final states to arrays and a JSON text, without the states and parameters, which the result has."""
     left_out = f"{PREFIX}states.", f"{PREFIX}{SUM}"
     arrays = {name: rows for name, rows in final.to_arrays().items() if not name.startswith(left_out)}
     return arrays, json.dumps({name: getattr(final, name) for name in NUMBERS})
@@ -48,7 +48,7 @@ def to_file(final: Final) -> tuple[dict[str, np.ndarray], str]:
 def from_file(
     content: Mapping[str, np.ndarray], samples: Mapping[str, np.ndarray], parameters: Mapping[str, np.ndarray]
 ) -> Final | None:
-    """Read the final states from a checked file; None if it has none."""
+    """Read the final states from the content of a checked file; None if the file has no final states."""
     if "final" not in content:
         return None
     states = {f"{PREFIX}states.{name}": samples[name][-1] for name in FIELDS if name in samples}

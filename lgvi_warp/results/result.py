@@ -102,7 +102,7 @@ class Result(Summarized):
         kept_members: Indices of the m members whose samples are in `kept`, shape (m,).
         store: Folder from which samples and parameters are read whenever they are used; None for a result in memory.
         jacobian: Derivatives of the samples with respect to the numbers in `tangents`, by field. Each has the shape of
-            the samples and a last dimension for these numbers. NaN after a member ended. Empty without `tangents`.
+            the samples plus a last axis over these numbers; NaN after a member ended. Empty without `tangents`.
         tangents: Names of the numbers of these derivatives, as given in `solve(tangents=...)`.
         end: Value of `final`, or a function without arguments that reads it; None if no final states were kept.
         compile_seconds: Time to load the kernel [s].

@@ -59,7 +59,7 @@ def export(
     ".csv" and ".parquet": a table with one row per member and sample time, or one row per member if there are no samples.
     ".nc": NetCDF-4 with trajectories in the CF conventions. ".geojson" and ".kml": tracks on a map. ".mcap": odometry and
     transforms in the axes of ROS. docs/guide/exports.md lists columns, names, units and axes. A footprint is exported as
-    its regions, to ".geojson" or ".kml". A scene is exported to ".fmu": its vehicle as a unit of the FMI standard.
+    its regions, to ".geojson" or ".kml". A scene is exported to ".fmu": its vehicle as a functional mock-up unit.
 
     Args:
         run: A result, a result.npz, a store, a folder with one result.npz or store, or the result of

@@ -79,7 +79,7 @@ def select_members(result: Result, most: int = MOST_BODIES) -> Shown:
 
     Raises:
         NothingToDraw: No samples were kept, or no member has a finite start.
-        SceneError: `most` is not a whole number from 1, or `result` is not a result.
+        SceneError: `most` is not a whole number of at least 1, or `result` is not a result.
 
     Examples:
         >>> import lgvi_warp as lw

@@ -82,7 +82,7 @@ def test_a_factor_in_the_disk_is_borne_and_one_beyond_is_not():
     assert 1.0 < found.values["disk_gain_upper"] < found.values["gain_upper"]
     assert "disk_phase rad" in str(found)
     labels = [axes.get_xlabel() for axes in lw.plots.margins(found)]
-    assert labels[2:] == ["disk margin", "disk margin as a factor", "disk margin as a phase [rad]"]
+    assert labels[2:] == ["disk margin", "disk-based gain margin, a factor", "disk-based phase margin [rad]"]
     assert found.to_dict()["eigenvalues"]["disk"] == found.values["disk"].tolist()
 
 

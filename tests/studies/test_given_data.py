@@ -84,4 +84,4 @@ def test_the_picture_has_a_bar_with_its_interval_for_each_input(result, tmp_path
     pytest.importorskip("matplotlib")
     axes = lw.plots.sensitivity(lw.uq.given_data(result, "depth"), path=tmp_path / "bars.png")
     assert len(axes[0].patches) == 3
-    assert axes[0].get_xlabel() == "part of the variance"
+    assert axes[0].get_xlabel() == "share of variance"

@@ -43,8 +43,8 @@ def test_the_worst_case_of_the_ensemble_is_the_largest_peak(answer):
     assert "angular_velocity[2]_frequency rad/s" in str(peaks)
     labels = [axes.get_xlabel() for axes in lw.plots.margins(peaks)]
     assert labels == [
-        "peak gain of S",
-        "peak gain of T",
+        "peak of sensitivity S",
+        "peak of complementary sensitivity T",
         "peak gain to rotation[2]",
         "peak gain to angular_velocity[2]",
     ]

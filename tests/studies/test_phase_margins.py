@@ -256,11 +256,11 @@ def test_pictures_of_open_loops(loops, tmp_path):
     # An angle, its rate and an integral: three quarters of a turn behind.
     assert phase.lines[0].get_ydata()[0] == pytest.approx(-1.5 * np.pi, abs=0.1)
     several, _ = lw.plots.bode(each["control_wrench"])
-    assert [text.get_text() for text in several.get_legend().get_texts()] == ["locus 1"]
+    assert [text.get_text() for text in several.get_legend().get_texts()] == ["characteristic locus 1"]
     axes = lw.plots.nyquist(each["heading_pid"], path=tmp_path / "nyquist.png")
     distances = np.abs(1.0 + each["heading_pid"].loci(w)).min(axis=(1, 2))
     (text,) = (text.get_text() for text in axes.get_legend().get_texts())
-    assert text == f"member {np.argmin(distances)}, nearest to -1 ({distances.min():.3g})"
+    assert text == f"member {np.argmin(distances)}, nearest to -1 (distance {distances.min():.3g})"
     assert (tmp_path / "nyquist.png").stat().st_size > 1000
     lost = dataclasses.replace(each["heading_pid"], models=(None,), why=np.array(["failed"], dtype=object))
     for draw in (lw.plots.bode, lw.plots.nyquist):

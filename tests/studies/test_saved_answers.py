@@ -63,7 +63,7 @@ def test_an_answer_is_saved_read_and_reported(name, tmp_path):
     page = lw.report(tmp_path, tmp_path / "report.html").read_text()
     assert f"<p>{html.escape(found.answer)}</p>" in page
     assert page.count(html.escape(found.answer)) == 1
-    says(page, "How it was made", name.replace("_", " ").capitalize())
+    says(page, "Settings of the study", name.replace("_", " ").capitalize())
     if name == "estimate":
         says(page, "recipe", "estimator", str(found.recipe["seed"]))
 

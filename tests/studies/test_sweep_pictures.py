@@ -50,7 +50,7 @@ def test_success_over_two_axes_is_a_map_with_intervals(scene):  # noqa: F811
     grid = {"controller.delay": [0.02, 0.04], "heading_pid.kd": [3.0, 4.0], "heading_pid.ki": [0.0]}
     wide = swept(scene, grid=grid, members=20)
     panels = sweeps.plot_success(wide)
-    assert [axes.get_title() for axes in panels] == [f"{case}: passes [%]" for case in wide.cases]
+    assert [axes.get_title() for axes in panels] == [f"{case}: members that pass [%]" for case in wide.cases]
     for axes, case in zip(panels, wide.cases, strict=True):
         image = axes.get_images()[0].get_array()
         for text in axes.texts:
@@ -112,14 +112,14 @@ def test_responses_are_fans_of_members_run_again(plain):
     panels = sweeps.plot_responses(plain, of="position", members=5)
     assert [axes.get_title() for axes in panels] == ["100 % pass: soft", "100 % pass: stiff"]
     figure = panels[0].figure
-    assert figure.get_supylabel() == "position from what is wanted [m]: 5 members"
+    assert figure.get_supylabel() == "error of position [m]: 5 members"
     result = plain.again("soft", range(5), None, lw.SaveAt(every=0.5, fields=("position", "reference_position")))
     away = np.linalg.norm(result.reference_position - result.position, axis=2)
     (median,) = (line for line in panels[0].get_lines() if line.get_label() == "median")
     drawn = np.interp(result.time, median.get_xdata(), median.get_ydata())
     np.testing.assert_allclose(drawn[[0, -1]], np.median(away, axis=1)[[0, -1]], rtol=1e-12)
     headings = sweeps.plot_responses(plain, of="heading", members=3)
-    assert "wanted" in [line.get_label() for line in headings[0].get_lines()]
+    assert "reference" in [line.get_label() for line in headings[0].get_lines()]
     with pytest.raises(NothingToDraw, match="no metric is of a number that is tracked"):
         sweeps.plot_responses(plain, of="overshoot")
 

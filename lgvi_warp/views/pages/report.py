@@ -160,7 +160,7 @@ def _of_run(result: Result) -> Iterator[str]:
     """HTML parts of a run's page."""
     yield _paragraph(title(result))
     yield _paragraph(run_answer(result))
-    yield _section("What became of the members", _outcome_table(result))
+    yield _section("Outcomes of the members", _outcome_table(result))
     remarks = [*result.messages, *_warnings(result), *(fault.text for fault in faults(result))]
     if remarks:
         yield _section("Notes and warnings", _list(remarks))
@@ -168,10 +168,10 @@ def _of_run(result: Result) -> Iterator[str]:
     if any(pictures):
         yield _section("Pictures", "".join(pictures))
     if result.statistics:
-        at = f"At {result.time[-1]:g} s, with intervals."
+        at = f"Estimates at {result.time[-1]:g} s, with confidence intervals."
         yield _section("Statistics", _paragraph(at) + _preformatted("\n".join(table(result.statistics))))
-    yield _section("How it was run", _table((), _settings(result)))
-    yield _section("Run it again", _again(result))
+    yield _section("Settings of the run", _table((), _settings(result)))
+    yield _section("Repeat the run", _again(result))
 
 
 def _outcome_table(result: Result) -> str:
@@ -227,7 +227,7 @@ def _settings(result: Result) -> Iterator[tuple[str, str]]:
     method = provenance["method"]
     yield "method", f"{method['name']}, {method['chosen']}" if method.get("chosen") else str(method["name"])
     yield "step", f"{provenance['step']:g} s, {provenance['steps']:,} steps"
-    yield "numbers", str(provenance["dtype"])
+    yield "number type", str(provenance["dtype"])
     yield "members", f"{result.members:,}"
     if (seed := provenance.get("ensemble", {}).get("seed")) is not None:
         yield "seed", str(seed)
@@ -256,7 +256,7 @@ def _of_study(path: Path) -> Iterator[str]:
         head, *rows = _rows_in(inside(path.parent, table_file)) or [[]]
         more = f"The first {MOST_ROWS:,} of {len(rows):,} rows; {table_file} has all." if len(rows) > MOST_ROWS else ""
         yield _section("Table", _paragraph(more) + _table(head, rows[:MOST_ROWS]))
-    yield _section("How it was made", _preformatted(json.dumps(short, indent=1)))
+    yield _section("Settings of the study", _preformatted(json.dumps(short, indent=1)))
 
 
 def _shortened(value: Any) -> Any:

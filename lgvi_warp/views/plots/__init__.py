@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Pictures of runs and studies, drawn with Matplotlib: each is a function that returns its axes."""
+"""Pictures of runs and studies, drawn with Matplotlib. Each function draws one picture and returns its axes."""

@@ -22,16 +22,16 @@ MOST = 12
 
 @picture
 def sensitivity(found: Indices, *, figure: Any = None, path: FilePath | None = None) -> np.ndarray:
-    """Draw the indices of each factor as bars with their confidence intervals, a panel for each quantity.
+    """Draw the sensitivity indices of each factor as bars with confidence intervals, one panel for each quantity.
 
     Args:
-        found: Indices of `lw.uq.sobol`, `lw.uq.morris` or `lw.uq.given_data`; the first 12 quantities that vary are drawn.
+        found: Indices from `lw.uq.sobol`, `lw.uq.morris` or `lw.uq.given_data`. At most 12 quantities are drawn.
 
     Returns:
         The axes, shape (quantities,).
 
     Raises:
-        NothingToDraw: No quantity varies.
+        NothingToDraw: No quantity varies between the members.
     """
     remedy = "give what lw.uq.sobol and its like return"
     of_kind("found", found, "quantities factors columns", "sensitivity indices", remedy)
@@ -55,11 +55,11 @@ def sensitivity(found: Indices, *, figure: Any = None, path: FilePath | None = N
         figure.legend(*grid[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False)
         failed = f", {found.failed} failed" if found.failed else ""
         names = [in_words(name) for q, name in enumerate(found.quantities) if q not in drawn]
-        more = f"; not shown: {', '.join(names)}" if names else ""
+        more = f"; quantities not shown: {', '.join(names)}" if names else ""
         still = [name for name, acts in zip(found.factors, acting, strict=True) if not acts and acting.any()]
-        more += f"; without any effect: {', '.join(still)}" if still else ""
+        more += f"; factors without effect: {', '.join(still)}" if still else ""
         text = f"{found.name}, {found.samples} samples, {found.members} members{failed}"
-        figure.suptitle(wrapped(f"{text}; {found.confidence:.0%} intervals{more}", figure))
+        figure.suptitle(wrapped(f"{text}; {found.confidence:.0%} confidence intervals{more}", figure))
     return grid.ravel()[: len(drawn)]
 
 
@@ -74,6 +74,6 @@ def _bars(axes: Any, indices: Indices, q: int, shown: np.ndarray) -> None:
         axes.barh(at, getattr(indices, column)[q][shown], width, xerr=half, label=column, color=COLORS[i], hatch=hatch(i),
                   edgecolor="white", linewidth=0.0, error_kw={"capsize": 2.0})  # fmt: skip
     axes.axvline(0.0, color="black", linewidth=0.5)
-    of_variance = indices.name.startswith("Sobol") or "first" in indices.columns
-    axes.set(title=in_words(indices.quantities[q]), xlabel="part of the variance" if of_variance else "effect")
+    share = indices.name.startswith("Sobol") or "first" in indices.columns
+    axes.set(title=in_words(indices.quantities[q]), xlabel="share of variance" if share else "effect [quantity's unit]")
     axes.grid(True, axis="x", alpha=0.3)

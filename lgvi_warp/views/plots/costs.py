@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Cost of a member's step: against members and threads, and term by term."""
+"""Pictures of the time per member and step: against members and threads, and for each term."""
 
 from __future__ import annotations
 
@@ -25,19 +25,19 @@ Rows = Iterable[Mapping[str, Any]] | str | os.PathLike[str]
 
 @picture
 def scaling(rows: Rows, *, figure: Any = None, path: FilePath | None = None) -> np.ndarray:
-    """Draw what a member's step costs against the number of members, and against the number of threads.
+    """Draw the time per member and step against the number of members, and against the number of threads.
 
-    A dotted line is ideal scaling, every thread as fast as one alone.
+    Dotted lines show ideal scaling: with twice the threads, the time is halved.
 
     Args:
-        rows: Rows that `python -m benchmarks run members threads` prints, or a file of them in JSON lines; rows of other
-            measurements are left out.
+        rows: Rows that `python -m benchmarks run members threads` prints, or the path of a file with such rows as JSON
+            lines. Rows of other measurements are ignored.
 
     Returns:
         The axes of members and of threads, shape (2,).
 
     Raises:
-        NothingToDraw: There is no row with members, threads and a cost.
+        NothingToDraw: No row has the keys members, threads and ns_per_vehicle_step.
         OSError: A file cannot be read or written.
     """
     points = measured(rows, ("members", "threads"), "`python -m benchmarks run members threads`")
@@ -50,30 +50,30 @@ def scaling(rows: Rows, *, figure: Any = None, path: FilePath | None = None) -> 
                 axes.plot(x, y, marker=MARKERS[i % len(MARKERS)], label=label, **style(i))
                 if across == "threads" and len(x) > 1:
                     axes.plot(x, y[0] * x[0] / x, color="black", linestyle=(0, (1, 2)), linewidth=0.8)
-            axes.set(xscale="log", yscale="log", xlabel=f"{across} [1]", ylabel="cost of a member's step [ns]")
+            axes.set(xscale="log", yscale="log", xlabel=f"{across} [1]", ylabel="time per member and step [ns]")
             axes.minorticks_off()
             axes.grid(True, alpha=0.3)
             ticks = sorted({point[across] for point in points})
             if len(ticks) < 8:
                 axes.set_xticks(ticks, [f"{tick:,}" for tick in ticks])
             legend_below(axes, ncols=3)
-        grid[0, 0].figure.suptitle("Wall time of a whole run over members and steps; dotted: divided by the threads")
+        grid[0, 0].figure.suptitle("Wall time of the run per member and step; dotted: ideal scaling with threads")
     return grid[0]
 
 
 @picture
 def term_cost(rows: Rows, *, ax: Any = None, path: FilePath | None = None) -> Any:
-    """Draw what a step costs with each term alone, beside the scene without terms, which is a line.
+    """Draw the time per member and step with each term alone as bars, and without terms as a line.
 
     Args:
-        rows: Rows of `lw.bench.term_cost`, or a file of JSON lines that `python -m benchmarks run terms` printed; of several
-            methods the first is drawn, with a bar for each precision.
+        rows: Rows of `lw.bench.term_cost`, or a file of JSON lines that `python -m benchmarks run terms` printed. If
+            the rows have several methods, only the first is drawn, with one bar for each precision.
 
     Returns:
         The axes.
 
     Raises:
-        NothingToDraw: There is no row with a term and a cost.
+        NothingToDraw: No row has the keys term, method, dtype and ns_per_vehicle_step.
         OSError: A file cannot be read or written.
     """
     points = measured(rows, ("term", "method", "dtype"), "lw.bench.term_cost(scene)")
@@ -91,13 +91,13 @@ def term_cost(rows: Rows, *, ax: Any = None, path: FilePath | None = None) -> An
             axes.bar_label(bars, fmt="%.3g", padding=3)
             if NONE in prices:
                 axes.axvline(prices[NONE], linewidth=1.0, **style(i))
-        axes.set(xlabel="cost of a member's step [ns]", ylabel="term [name]")
+        axes.set(xlabel="time per member and step [ns]", ylabel="term [name]")
         axes.set_yticks(range(len(terms)), terms)
         axes.margins(x=0.12)
         axes.invert_yaxis()
         axes.grid(True, axis="x", alpha=0.3)
         if ax is None:
-            axes.set_title(f"{method}, one core; lines: without terms")
+            axes.set_title(f"{method} on one core; lines: scene without terms")
         legend_below(axes, ncols=3)
     return axes
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A picture of margins: how many members of a fleet bear less than so much gain, delay or both."""
+"""Picture of stability margins: their cumulative distributions over the members of a fleet."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ LABELS = {
     "delay": "delay margin [s]",
     "phase": "phase margin [rad]",
     "disk": "disk margin",
-    "disk_gain_upper": "disk margin as a factor",
-    "disk_phase": "disk margin as a phase [rad]",
-    "sensitivity_peak": "peak gain of S",
-    "complementary_peak": "peak gain of T",
+    "disk_gain_upper": "disk-based gain margin, a factor",
+    "disk_phase": "disk-based phase margin [rad]",
+    "sensitivity_peak": "peak of sensitivity S",
+    "complementary_peak": "peak of complementary sensitivity T",
 }
 # Of these a member is the worse, the more it has.
 MORE_IS_WORSE = ("lower", "peak")
@@ -36,13 +36,13 @@ MARKED = 0.05
 
 @picture
 def margins(found: Margins, *, figure: Any = None, path: FilePath | None = None) -> np.ndarray:
-    """Draw how margins are distributed over the members that have them, a panel for each margin.
+    """Draw the distribution of each stability margin over the members that have margins, one panel for each margin.
 
-    Curves are cumulative distributions over the members, by eigenvalues and by runs, if requested. A line marks the margin
-    that 95 % of the members reach. Infinite margins lie beyond the right edge: their curve ends below 100 %.
+    Curves are cumulative distributions, by eigenvalues and, if requested, by runs. A dotted line marks the value that
+    95 % of the members reach (peaks, lower gains: do not exceed). A curve ends below 100 % if margins are infinite.
 
     Args:
-        found: Margins of `lw.linear.margins`.
+        found: Margins from `lw.linear.margins`.
 
     Returns:
         The axes, shape (margins,).
@@ -74,7 +74,7 @@ def margins(found: Margins, *, figure: Any = None, path: FilePath | None = None)
             axes.grid(alpha=0.3)
             axes.legend()
         for axes in grid[:, 0]:
-            axes.set_ylabel("members with at most that [%]")
+            axes.set_ylabel("members at or below this value [%]")
         lost = found.members - int(steady.sum())
         remark = f"; {lost:,} have none ({found.reasons_text})" if lost else ""
         title = f"{found.loop}: margins of {found.members - lost:,} members{remark}"
@@ -91,10 +91,10 @@ def _curve(axes: Any, values: np.ndarray, shares: np.ndarray, **line: Any) -> No
 
 
 def _mark(axes: Any, values: np.ndarray, name: str) -> None:
-    """Mark what all but one in twenty members bear, or have at most."""
+    """Mark the value that all but one in twenty members reach, or do not exceed if smaller is better."""
     level = 1.0 - MARKED if name.endswith(MORE_IS_WORSE) else MARKED
     edge = float(np.quantile(values, level, method="inverted_cdf"))
     if np.isfinite(edge):
-        verb = "have at most" if name.endswith("peak") else "of the members bear"
-        label = f"{100.0 * (1.0 - MARKED):g} % {verb} {edge:.3g}"
+        verb = "at most" if name.endswith(MORE_IS_WORSE) else "at least"
+        label = f"{100.0 * (1.0 - MARKED):g} % of members: {verb} {edge:.3g}"
         axes.axvline(edge, color="0.3", linestyle=":", label=label)

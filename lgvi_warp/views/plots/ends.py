@@ -44,9 +44,9 @@ MOST_POINTS, MOST_PAIRS = 1000, 6
 
 @picture
 def outcomes(result: Result, *, ax: Any = None, path: FilePath | None = None) -> Any:
-    """Draw the share of the members under way against time, and of those that ended, by outcome.
+    """Draw the shares of members under way and of ended members, by outcome, against time.
 
-    It needs no samples: a run with keep="none" and a run in a store have all that is drawn.
+    No samples are needed, so runs with keep="none" can be drawn, too.
 
     Args:
         result: A result.
@@ -78,7 +78,7 @@ def draw_outcomes(axes: Any, result: Result) -> None:
     going = result.members - sum(counts.values(), np.zeros(len(time)))
     shares = [100.0 * count / result.members for count in (going, *counts.values())]
     ok = int((status == Status.OK).sum())
-    labels = [f"under way, {ok:,} to the end"] + [_first(result, code, when) for code in ended]
+    labels = [f"under way; {ok:,} reach the end"] + [_first(result, code, when) for code in ended]
     colors = [OUTCOME_STYLES[code].color for code in (Status.OK, *ended)]
     for i, area in enumerate(axes.stackplot(time, *shares, colors=colors, labels=labels)):
         area.set(hatch=hatch(i), edgecolor="white", linewidth=0.0)
@@ -97,22 +97,22 @@ def _first(result: Result, code: Status, when: np.ndarray) -> str:
 def histogram(
     result: Result, of: Any = "depth", at: float | None = None, *, ax: Any = None, path: FilePath | None = None
 ) -> Any:
-    """Draw a histogram of a number over the members at one time, stacked by their outcomes up to then.
+    """Draw a histogram of a quantity over the members at one time, stacked by the outcomes up to this time.
 
-    Members that ended are counted at their last state. Depths are on the vertical axis, downwards. Without samples a statistic
-    lw.statistics.Histogram of the quantity is drawn.
+    Members that ended are counted with their last state. A depth is drawn on the vertical axis, which points down. If
+    no samples were kept, a statistic lw.statistics.Histogram of the quantity is drawn.
 
     Args:
         result: A result, in memory or in a store.
-        of: A quantity of one number, also over the path: "depth", "max(speed)", a `lw.statistics.Quantity`; default "depth".
-        at: Time [s]; the sample nearest to it is drawn. Default None: the last.
+        of: A quantity with one component, such as "depth" (default), "max(speed)" or a `lw.statistics.Quantity`.
+        at: Time [s]; the sample nearest to this time is drawn. Default None: the last sample.
 
     Returns:
         The axes.
 
     Raises:
-        NothingToDraw: Nothing of the quantity was kept or gathered, or no member has a finite number.
-        SceneError: The quantity is not known, or has several numbers.
+        NothingToDraw: Neither samples nor a histogram of the quantity were kept, or no member has a finite value.
+        SceneError: The quantity is unknown, or has several components.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -201,18 +201,18 @@ def pairs(
     figure: Any = None,
     path: FilePath | None = None,
 ) -> np.ndarray:
-    """Draw numbers of the members at the end against each other, coloured by outcome, and how each is spread.
+    """Draw each pair of quantities at the end as points, coloured by outcome, and each quantity as a histogram.
 
     Args:
         result: A result with the samples that the quantities need, in memory or in a store.
-        of: Two to six quantities, also over the path, as "max(depth)"; default north, east, depth and speed.
+        of: Quantities with two to six components in total, such as "max(depth)"; default north, east, depth and speed.
 
     Returns:
-        The axes, shape (m, m) for m numbers.
+        The axes, shape (m, m) for m components.
 
     Raises:
-        NothingToDraw: Samples that are needed were not kept, or no member has a finite start.
-        SceneError: A quantity is not known, or there are fewer than two numbers or more than six.
+        NothingToDraw: Required samples were not kept, or no member has a finite start.
+        SceneError: A quantity is unknown, or there are fewer than two or more than six components.
     """
     result = with_samples(result)
     choice = select_members(result, MOST_POINTS)

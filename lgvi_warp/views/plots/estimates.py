@@ -25,19 +25,19 @@ PANELS, LINES = 12, 12
 
 @picture
 def statistics(result: Result, *, figure: Any = None, path: FilePath | None = None) -> np.ndarray:
-    """Draw a run's statistics against time, one panel each.
+    """Draw a run's statistics against time, one panel for each statistic.
 
-    Quantiles are drawn as a fan, other statistics with their intervals, histograms as colours. Statistics of paths, which have
-    one time, and covariances are left to the table; the picture names them.
+    Quantiles are drawn as bands, means and probabilities as lines with intervals, extremes as a band, histograms as
+    colours. Covariances, and statistics with a single time, are not drawn; the title names them.
 
     Args:
-        result: A result with statistics; the first 12 that can be drawn are.
+        result: A result with statistics. At most 12 of them are drawn.
 
     Returns:
         The axes, shape (panels,).
 
     Raises:
-        NothingToDraw: There is no statistic against time.
+        NothingToDraw: The run gathered no statistic that can be drawn against time.
     """
     drawn = drawable(result)[:PANELS]
     if not drawn:
@@ -53,9 +53,9 @@ def statistics(result: Result, *, figure: Any = None, path: FilePath | None = No
             _units(axes, result, estimate)
         names = {estimate.name for estimate in drawn}
         omitted = [name for name in result.statistics if name not in names]
-        more = f"; not drawn, see the table: {', '.join(omitted)}" if omitted else ""
-        text = f"{of_members(result.members, members_of_run(result))}, intervals of {drawn[0].confidence:.0%}{more}"
-        grid[0, 0].figure.suptitle(wrapped(text, grid[0, 0].figure))
+        more = f"; not drawn, see the table of statistics: {', '.join(omitted)}" if omitted else ""
+        members, level = of_members(result.members, members_of_run(result)), drawn[0].confidence
+        grid[0, 0].figure.suptitle(wrapped(f"{members}, {level:.0%} confidence intervals{more}", grid[0, 0].figure))
     return grid.ravel()[: len(drawn)]
 
 

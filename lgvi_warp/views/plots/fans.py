@@ -55,22 +55,22 @@ STANDING = ("quantiles", "mean", "extremes")
 
 @picture
 def fan(result: Result, of: Any = "depth", *, ax: Any = None, path: FilePath | None = None) -> Any:
-    """Draw one number of all members against time: the median and bands of quantiles of those under way at each time.
+    """Draw a quantity against time: the median and bands between quantiles of the members under way at each time.
 
-    Members that an event stopped, or that failed, are marked where they ended. One vehicle is a line. Angles of `euler` are
-    drawn about their mean direction. Without samples the statistics are drawn that were gathered of the quantity.
+    Markers show where members failed or were stopped by an event. A single vehicle is drawn as a line. Roll and yaw are
+    drawn about their mean direction. If no samples were kept, statistics of the quantity are drawn.
 
     Args:
         result: A result, in memory or in a store.
-        of: Name of the quantity or of one component, as "depth", "speed", "position[0]", or a `lw.statistics.Quantity`;
+        of: Name of the quantity or of one component, such as "speed" or "position[0]", or a `lw.statistics.Quantity`;
             default "depth".
 
     Returns:
         The axes.
 
     Raises:
-        NothingToDraw: Nothing of the quantity was kept or gathered, or no member has a finite number.
-        SceneError: The quantity is not known, or has several components.
+        NothingToDraw: Neither samples nor statistics of the quantity were kept, or no member has a finite value.
+        SceneError: The quantity is unknown, or has several components.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -135,7 +135,7 @@ def text_of(survey: ValuesUnderWay, total: int) -> str:
     text = of_members(survey.total, total)
     if (survey.under_way != survey.total).any():
         text = f"under way: {first:,} at {survey.time[0]:g} s,\n{last:,} at {survey.time[-1]:g} s"
-    return text if survey.ranked == survey.total else f"{text}; quantiles of {survey.ranked:,}"
+    return text if survey.ranked == survey.total else f"{text}; quantiles from {survey.ranked:,}"
 
 
 def draw_bands(axes: Any, time: np.ndarray, values: np.ndarray, counted: np.ndarray, **median: Any) -> None:
@@ -178,8 +178,8 @@ def _draw_estimate(axes: Any, estimate: Estimate, component: int) -> None:
             label = f"{band(0.0, levels[pairs])} quantile"
             axes.plot(time, values[:, pairs], color="black", linewidth=1.2, label=label)
     elif kind == "mean":
-        low, high = estimate.lower[:, component], estimate.upper[:, component]
-        axes.fill_between(time, low, high, color=TINTS[1], linewidth=0, label=f"its {estimate.confidence:.0%} interval")
+        low, high, level = estimate.lower[:, component], estimate.upper[:, component], estimate.confidence
+        axes.fill_between(time, low, high, color=TINTS[1], linewidth=0, label=f"{level:.0%} confidence interval")
         axes.plot(time, estimate.value[:, component], color="black", linewidth=1.2, label="mean")
     else:
         low, high = estimate["minimum"][:, component], estimate["maximum"][:, component]
@@ -189,20 +189,20 @@ def _draw_estimate(axes: Any, estimate: Estimate, component: int) -> None:
 
 @picture
 def compare(results: Mapping[str, Result], of: Any = "depth", *, ax: Any = None, path: FilePath | None = None) -> Any:
-    """Draw one number of several runs against time: a median and a band of 90 % of the members under way for each.
+    """Draw a quantity of several runs against time: for each run, the median and the middle 90 % of members under way.
 
-    Without samples a run is drawn by its statistics `lw.statistics.Quantiles` or `lw.statistics.Mean` of the quantity.
+    A run without samples is drawn by a statistic `lw.statistics.Quantiles` or `lw.statistics.Mean` of the quantity.
 
     Args:
-        results: Results by label.
+        results: Mapping of labels to results.
         of: Name of the quantity or of one component, or a `lw.statistics.Quantity`; default "depth".
 
     Returns:
         The axes.
 
     Raises:
-        NothingToDraw: A run kept or gathered nothing of the quantity, or no member has a finite number.
-        SceneError: There are no results, or the quantity is not known or has several components.
+        NothingToDraw: A run has neither samples nor such a statistic, or no member has a finite value.
+        SceneError: `results` is empty, or the quantity is unknown or has several components.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -229,7 +229,7 @@ def compare(results: Mapping[str, Result], of: Any = "depth", *, ax: Any = None,
         if is_depth(meaning):
             point_down(axes, floors_of_each(results))
         sampled = any(curve.banded and not curve.from_statistics for curve in curves.values())
-        legend_below(axes, title="median, and band of 90 % of the members under way" if sampled else None)
+        legend_below(axes, title="median and middle 90 % of the members under way" if sampled else None)
     return axes
 
 
@@ -262,7 +262,7 @@ def _curve_of(result: Result, of: Quantity) -> RunCurve:
     members = of_members(result.members, members_of_run(result))
     if statistic.settings["type"] == "mean":
         edges = statistic.lower[:, component], statistic.value[:, component], statistic.upper[:, component]
-        text = f"{members}, mean and its {statistic.confidence:.0%} interval"
+        text = f"{members}, mean and {statistic.confidence:.0%} confidence interval"
     else:
         levels, values = statistic.coordinates["level"], statistic.value[:, :, component]
         center = int(np.abs(levels - 0.5).argmin())

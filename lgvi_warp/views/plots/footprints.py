@@ -24,13 +24,13 @@ if TYPE_CHECKING:
 def footprint(
     result: Result | Footprint, at: str | float = "end", *, ax: Any = None, path: FilePath | None = None
 ) -> Any:
-    """Draw the smallest regions that hold 50, 90, 95 and 99 % of the members, north up, with the contours of the floor.
+    """Draw the smallest regions that contain 50, 90, 95 and 99 % of the members, with north up and depth contours.
 
-    Beside them are the ellipse of 95 % of a normal distribution, the centre, and up to 1,000 members.
+    Also drawn are the 95 % ellipse of a normal distribution, the 95 % circle, the centre, and at most 1,000 members.
 
     Args:
-        result: A result with positions, in memory or in a store; or what `lw.studies.footprint` returns.
-        at: As in `lw.studies.footprint`; omit it if `result` is the answer of that.
+        result: A result with positions, in memory or in a store; or a footprint from `lw.studies.footprint`.
+        at: As in `lw.studies.footprint`, by default "end"; omit it if `result` is a footprint.
 
     Returns:
         The axes.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Inputs of members that ended differently: their outcomes over the inputs that tell them apart."""
+"""Picture of the outcomes of members over the two inputs that best explain them."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ CONFIDENCE = 0.95
 
 
 def inputs_by_outcome(result: Result, *, ax: Any = None, path: FilePath | None = None) -> Any:
-    """Draw the outcomes of members over the two inputs that explain most of who had the most frequent one."""
+    """Draw the outcomes of members over the two inputs that best explain who had the most frequent outcome."""
     inputs, status = varied(result), np.asarray(result.status)
     codes = outcomes(result)
     if len(codes) < 2 or not inputs:
@@ -35,14 +35,14 @@ def inputs_by_outcome(result: Result, *, ax: Any = None, path: FilePath | None =
     first, *others = sorted(inputs, key=lambda name: -np.nan_to_num(shares[name], nan=-1.0))
     members = np.sort(np.argsort(mixed(np.arange(result.members)), kind="stable")[:MOST_POINTS])
     upward = inputs[others[0]] if others else np.arange(result.members)
-    words = {name: f"{name}: explains {100.0 * max(shares[name], 0.0):.3g} %" for name in inputs}
+    words = {name: f"{name}: explains {100.0 * max(shares[name], 0.0):.3g} % of the variance" for name in inputs}
     with panel(ax, path, (8.0, 6.0)) as axes:
         for code in codes:
             group = members[status[members] == code]
             label = f"{code.name.lower()} ({int((status == code).sum()):,})"
             axes.scatter(inputs[first][group], upward[group], s=14, alpha=0.8, label=label, **mark(code))
-        axes.set(xlabel=words[first], ylabel=words[others[0]] if others else "member")
-        axes.set_title(wrapped(f"Inputs that tell apart who ended as {most.name.lower()}", axes.figure))
+        axes.set(xlabel=words[first], ylabel=words[others[0]] if others else "member index")
+        axes.set_title(wrapped(f"Inputs that best explain the outcome {most.name.lower()}", axes.figure))
         widen(axes.xaxis)
         legend_below(axes, ncols=3)
     return axes

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Pictures of open loops: Bode's and Nyquist's, with the spread of the fleet."""
+"""Bode and Nyquist plots of open loops, with the spread over the fleet."""
 
 from __future__ import annotations
 
@@ -48,10 +48,10 @@ def _title(axes: Any, opened: OpenLoops, members: np.ndarray) -> None:
 
 @picture
 def bode(opened: OpenLoops, *, figure: Any = None, path: FilePath | None = None) -> np.ndarray:
-    """Draw gain and phase of open loops against frequency: the median and bands of the members.
+    """Draw gain and phase of open loops against frequency: the median and bands between quantiles over the members.
 
-    For loops with several inputs the characteristic loci are drawn, sorted by size: the median and the band of each over
-    the members.
+    For loops with several inputs, the characteristic loci (eigenvalues of the frequency response) are drawn, sorted by
+    magnitude: for each locus, the median and the range over the members.
 
     Args:
         opened: Open loops of `lw.linear.loop`.
@@ -75,7 +75,7 @@ def bode(opened: OpenLoops, *, figure: Any = None, path: FilePath | None = None)
                 for i in np.flatnonzero((gains > 0.0).any(axis=(0, 1))).tolist():
                     low, middle, high = np.quantile(each[:, :, i], (0.0, 0.5, 1.0), axis=0)
                     shade(axes, w, low, high, i)
-                    axes.plot(w, middle, label=f"locus {i + 1}", **style(i))
+                    axes.plot(w, middle, label=f"characteristic locus {i + 1}", **style(i))
             axes.axhline(level, color="0.3", linestyle=":", linewidth=1.0)
             axes.set(ylabel=label, xscale="log")
             axes.grid(True, alpha=0.3)
@@ -88,10 +88,10 @@ def bode(opened: OpenLoops, *, figure: Any = None, path: FilePath | None = None)
 
 @picture
 def nyquist(opened: OpenLoops, *, ax: Any = None, path: FilePath | None = None) -> Any:
-    """Draw open loops in the complex plane near -1, a curve for each member; the one that comes nearest to -1 is marked.
+    """Draw the Nyquist curves of open loops near -1, one curve for each member; the curve nearest to -1 is highlighted.
 
-    The curves are those of positive frequencies. For loops with several inputs the characteristic loci are drawn. A circle
-    of radius 1 is drawn, too.
+    Only positive frequencies are drawn. For loops with several inputs, the characteristic loci (eigenvalues of the
+    frequency response) are drawn. A dotted line shows the unit circle.
 
     Args:
         opened: Open loops of `lw.linear.loop`.
@@ -109,7 +109,7 @@ def nyquist(opened: OpenLoops, *, ax: Any = None, path: FilePath | None = None) 
         for i, loci in enumerate(values):
             marked = i == nearest
             line = {"color": COLORS[1], "linewidth": 1.6, "zorder": 3} if marked else {"color": COLORS[0], "alpha": 0.4}
-            label = f"member {members[i]}, nearest to -1 ({distances[i]:.3g})" if marked else None
+            label = f"member {members[i]}, nearest to -1 (distance {distances[i]:.3g})" if marked else None
             for locus in loci.T:
                 axes.plot(locus.real, locus.imag, label=label, **line)
                 label = None

@@ -23,10 +23,10 @@ STYLES = {"rotation": "-", "munk": "--", "restoring": "-.", "drag": ":"}
 
 @picture
 def stability(found: StabilityMap, *, figure: Any = None, path: FilePath | None = None) -> np.ndarray:
-    """Draw a stability map, a panel for each method, with the analytic limits that lie in it.
+    """Draw a stability map, one panel for each method, with the analytic stability limits that lie within the map.
 
     Args:
-        found: A map of `lw.stability_map`.
+        found: A map from `lw.stability_map`.
 
     Returns:
         The axes, shape (methods,).
@@ -41,7 +41,7 @@ def stability(found: StabilityMap, *, figure: Any = None, path: FilePath | None 
             _cells(axes, found, method)
             drawn |= _limits(axes, found, method)
             limit = found.limit(method)
-            text = f"{method}: every row to {limit.min():.2g} {found.x.unit}" if np.isfinite(limit).all() else method
+            text = f"{method}: bounded to {limit.min():.2g} {found.x.unit}" if np.isfinite(limit).all() else method
             axes.set(title=text, xlabel=f"{found.x.label} [{found.x.unit}]")
         for axes in grid[:, 0]:
             axes.set_ylabel(f"{found.y.label} [{found.y.unit}]")
@@ -51,8 +51,8 @@ def stability(found: StabilityMap, *, figure: Any = None, path: FilePath | None 
             axes.tick_params(labelbottom=True)
         figure = grid[0, 0].figure
         _legend(figure, drawn)
-        scene = f"accurate: {found.of} to {found.error_bound:g} {found.unit} up to {found.error_time:.3g} s"
-        bounded = f"bounded: energy up to {found.t1:.3g} s; worst of {found.directions} starts"
+        scene = f"accurate: {found.of} error below {found.error_bound:g} {found.unit} until {found.error_time:.3g} s"
+        bounded = f"bounded: energy until {found.t1:.3g} s; cells show the worst of {found.directions} starts"
         figure.suptitle(wrapped(f"{scene}; {bounded}", figure))
     return grid.ravel()[:n]
 

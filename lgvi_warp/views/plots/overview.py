@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The first look at a run, in panels that suit it; and the drift of what its laws conserve."""
+"""Overview of a run in up to four panels, and the drift of its conserved quantities."""
 
 from __future__ import annotations
 
@@ -36,12 +36,12 @@ MOST_FOLLOWED = AT_ONCE // 40 // 240 * 10
 
 @picture
 def summary(result: Result, *, figure: Any = None, path: FilePath | None = None) -> np.ndarray:
-    """Draw a run at a glance, in up to four panels that suit it.
+    """Draw an overview of a run in up to four panels.
 
-    The first two show paths of a few members from above, and the depth of all members with the ends of those that failed or
-    that an event stopped. The third shows the commands of a controller with their limits and faults if they were kept, else
-    roll, pitch and yaw. The last shows the outcomes over time if any member ended, else the energy, or its error if the
-    scene conserves it. A panel without data is left out. Without samples the statistics are drawn.
+    The first panel shows paths of at most 12 members from above. The second shows the depth of all members, with marks
+    where members failed or an event stopped them. The third shows the controller's commands with limits and faults or,
+    without saved commands, roll, pitch and yaw. The last shows the outcomes if a member ended early, and otherwise the
+    energy, or its change if the scene conserves it. Without samples, the statistics of the run are drawn.
 
     Args:
         result: A result, in memory or in a store.
@@ -50,7 +50,7 @@ def summary(result: Result, *, figure: Any = None, path: FilePath | None = None)
         The axes, shape (panels,).
 
     Raises:
-        NothingToDraw: Every member failed before the second sample, none has a finite position, or nothing was kept.
+        NothingToDraw: Every member failed before the second sample, no position is finite, or nothing was kept.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -108,7 +108,7 @@ def _outcomes(result: Result, axes: Any) -> list[str]:
 
 @picture
 def drift(result: Result, *, ax: Any = None, path: FilePath | None = None) -> Any:
-    """Draw the largest change of what the scene's laws conserve, energy and momenta, over the members under way.
+    """Draw the largest change, over the members under way, of the energy and momenta that the scene conserves.
 
     Args:
         result: A result with all fields of the motion, in memory or in a store.
@@ -117,7 +117,7 @@ def drift(result: Result, *, ax: Any = None, path: FilePath | None = None) -> An
         The axes, with a logarithmic scale.
 
     Raises:
-        NothingToDraw: The laws conserve nothing, or fields of the motion were not kept.
+        NothingToDraw: The scene conserves neither energy nor momenta, or fields of the motion were not kept.
     """
     result, choice, some = selected(result, MOST_FOLLOWED, tuple(FIELDS), "the drift")
     kept = sorted(invariants.conserved(result))

@@ -17,11 +17,11 @@ FilePath = str | os.PathLike[str]
 Draws = TypeVar("Draws", bound=Callable[..., Any])
 # What pictures have in common, as their help says it.
 HELP = {
-    "ax": "Matplotlib axes to draw on; default None, those of a figure of its own.",
-    "figure": "Matplotlib figure to draw on; default None, one of its own.",
-    "path": "File to write; its ending chooses the format. Default None: none is written.",
-    "style": '"one_column" or "two_columns": as wide as those of a printed page (3.5 and 7.16 in), with text of 8 points, '
-    "fonts embedded in PDF and 300 dots per inch. Default None, for screens.",
+    "ax": "Matplotlib axes to draw on; default None: the axes of a new figure.",
+    "figure": "Matplotlib figure to draw on; default None: a new figure.",
+    "path": "File to write; its extension selects the format. Default None: no file is written.",
+    "style": '"one_column" or "two_columns": as wide as one or two columns of a printed page (3.5 or 7.16 in), with '
+    "8-point text, fonts embedded in PDF and 300 dots per inch. Default None: a picture for screens.",
 }
 # Columns of a printed page -> their width [in], as IEEE's journals have them.
 WIDTHS = {"one_column": 3.5, "two_columns": 7.16}

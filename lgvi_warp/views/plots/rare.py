@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A picture of a rare event: how chains came to it level by level, and which members it happens to."""
+"""Picture of a rare event: exceedance probabilities of its limit, and the inputs of failing members."""
 
 from __future__ import annotations
 
@@ -23,19 +23,19 @@ PLAIN, MOST = 1000, 1000
 
 @picture
 def rare(found: RareEvent, *, figure: Any = None, path: FilePath | None = None) -> np.ndarray:
-    """Draw a rare event: the probability to exceed each limit, by the levels of each run, and failing members over plain ones.
+    """Draw the result of `lw.rare_event`: exceedance probabilities of the limit, and the inputs of failing members.
 
-    The first panel says how probable it is that the limit is above a number, up to the event at 0; circles are the thresholds
-    of levels. The second has the two numbers that the event moves most, in standard deviations from the middle.
+    The first panel, drawn for subset simulation or splitting, shows the probability that the limit exceeds a value. The
+    event is at 0; circles mark thresholds. The second shows failing and all members in the two most changed inputs.
 
     Args:
-        found: What `lw.rare_event` returns.
+        found: Result of `lw.rare_event`.
 
     Returns:
         The axes, shape (panels,).
 
     Raises:
-        NothingToDraw: The event was sampled plainly, and nothing but noise varies.
+        NothingToDraw: The answer has no levels (as by plain sampling), and nothing but noise varies.
     """
     of_kind("found", found, "probability runs normals", "of lw.rare_event", "give what lw.rare_event returns")
     numbers = bool(found.moved) and len(found.normals) > 0
@@ -47,7 +47,7 @@ def rare(found: RareEvent, *, figure: Any = None, path: FilePath | None = None) 
             _levels(grid[0, 0], found)
         if numbers:
             _failing(grid[0, -1], found)
-        title = f"{found.event}: probability {found.probability:.3g}, error {100.0 * found.relative_error:.2g} % of it"
+        title = f"{found.event}: probability {found.probability:.3g}, relative error {100 * found.relative_error:.2g} %"
         grid[0, 0].figure.suptitle(wrapped(title, grid[0, 0].figure))
     return np.asarray(grid.ravel())
 
@@ -61,7 +61,7 @@ def _levels(axes: Any, answer: RareEvent) -> None:
         axes.semilogy(bounds, np.interp(bounds, limits, chances), "o", color=style(i)["color"], fillstyle="none")
     axes.axvline(0.0, color="0.3", linestyle=":", label="the event")
     axes.axhline(answer.probability, color="0.3", linewidth=0.8)
-    axes.set(xlabel="limit", ylabel="probability of more")
+    axes.set(xlabel="limit (event: above 0)", ylabel="probability of exceedance")
     axes.grid(alpha=0.3)
     axes.legend()
 
@@ -89,11 +89,11 @@ def _failing(axes: Any, answer: RareEvent) -> None:
     plain = generator(0, "rare picture").standard_normal((PLAIN, 2))
     chosen = generator(1, "rare picture").choice(len(answer.weights), size=MOST, p=answer.weights)
     axes.plot(
-        plain[:, 0], plain[:, 1] if len(names) > 1 else 0.0 * plain[:, 1], ".", color=GREY, markersize=3, label="plain"
+        plain[:, 0], plain[:, 1] if len(names) > 1 else 0.0 * plain[:, 1], ".", color=GREY, ms=3, label="all members"
     )
     x = answer.normals[chosen, first]
     y = answer.normals[chosen, second] if len(names) > 1 else 0.0 * x
-    axes.plot(x, y, "^", color=COLORS[1], markersize=3, label="the event")
+    axes.plot(x, y, "^", color=COLORS[1], markersize=3, label="failing members")
     axes.set(xlabel=f"{names[first]} [sd]", ylabel=f"{names[second]} [sd]" if len(names) > 1 else "")
     axes.grid(alpha=0.3)
     axes.legend()

@@ -34,7 +34,7 @@ def draw_commands(result: Result, axes: Any) -> list[str]:
     for limit in lined:
         axes.axhline(limit, color=GREY, linestyle=(0, (6, 2)), linewidth=1.0, label="limit" if limit > 0.0 else None)
     fault_texts = _mark_faults(axes, result)
-    axes.set(xlabel="time [s]", ylabel="command [unit of each]", title=f"Commands{_bands(some.members)}")
+    axes.set(xlabel="time [s]", ylabel="command [unit of its channel]", title=f"Commands{_bands(some.members)}")
     legend_below(axes, ncols=3)
     return fault_texts
 
@@ -50,7 +50,7 @@ def draw_angles(result: Result, axes: Any) -> list[str]:
             padded = np.pad(scattered, 1, constant_values=True)
             scattered |= padded[:-2] & padded[2:]
         levels[:, scattered] = np.nan
-        gaps = ": all ways" if scattered.all() else "; gaps: all ways" if scattered.any() else ""
+        gaps = ": no mean direction" if scattered.all() else "; gaps: no mean direction" if scattered.any() else ""
         label = f"{WORDS[name]}{gaps}"
         _band(axes, survey.time, levels, i, label, banded=survey.total > 1)
     fault_texts = _mark_faults(axes, result)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Pictures of sweeps: success by case and over the grid, metrics by case, paired differences, what failures go with.
+"""Pictures of sweeps: success by case and over the grid, metrics by case, paired differences, inputs of failures.
 
-Each draws on `figure=` or on a figure of its own, writes a file where `path` names one, and returns its axes.
+Each function draws on `figure=` or on a new figure, writes a file if `path` is given, and returns its axes.
 """
 
 from __future__ import annotations
@@ -89,7 +89,7 @@ def plot_success(sweep: Sweep, path: FilePath | None = None, *, figure: Any = No
             _ends(axes, sweep, cells, list(map(float, range(len(cells)))), None, marker="o", linestyle="none")
             turned = 0.0 if len(cells) <= MOST_LEVEL else 90.0
             axes.set_xticks(range(len(cells)), [cell.case.name for cell in cells], rotation=turned)
-        axes.set_ylabel(f"passes [%], {sweep.confidence:.0%} interval")
+        axes.set_ylabel(f"members that pass [%], {sweep.confidence:.0%} interval")
         axes.grid(alpha=0.3)
     return grid.ravel()
 
@@ -134,7 +134,7 @@ def _maps(sweep: Sweep, long: list[str], path: FilePath | None, figure: Any) -> 
             axes.set_xticks(range(len(x)), [str(value) for value in x])
             axes.set_yticks(range(len(y)), [str(value) for value in y])
             axes.set_xlabel(labels[long[0]])
-            axes.set_title(f"{case}: passes [%]")
+            axes.set_title(f"{case}: members that pass [%]")
         grid[0, 0].set_ylabel(labels[long[1]])
         if remark := ", ".join(f"{labels[name]} = {further[name]}" for name in long[2:]):
             grid[0, 0].figure.suptitle(f"at {remark}")
@@ -162,7 +162,7 @@ def plot_metrics(sweep: Sweep, path: FilePath | None = None, *, figure: Any = No
             axes.grid(alpha=0.3, axis="y")
         turned = 0.0 if len(cells) <= MOST_LEVEL else 90.0
         grid[-1, 0].set_xticks(places, [_short(sweep, cell.case.name, cell.point) for cell in cells], rotation=turned)
-        hidden = f"; {len(every) - len(cells)} more are not shown" if len(every) > len(cells) else ""
+        hidden = f"; {len(every) - len(cells)} more cells are not shown" if len(every) > len(cells) else ""
         grid[-1, 0].set_xlabel(_meaning(sweep) + hidden)
     return grid.ravel()
 
@@ -182,24 +182,24 @@ def plot_differences(sweep: Sweep, path: FilePath | None = None, *, figure: Any 
         raise NothingToDraw("there is no other case that ran to compare with the baseline")
     with panels(figure, path, (1, 1), (8.0, 1.4 + 0.3 * len(rows))) as grid:
         axes = grid[0, 0]
-        for real, color, marker, label in ((True, COLORS[0], "o", "real"), (False, GREY, "s", "not real")):
+        for real, color, shape, label in ((True, COLORS[0], "o", "significant"), (False, GREY, "s", "not significant")):
             places = [i for i, row in enumerate(rows) if bool(row.real) is real]
             if places:
                 ends = [(row.difference.value, row.difference.lower, row.difference.upper) for row in rows]
                 value, lower, upper = 100.0 * np.array(ends)[places].T
                 bars = np.maximum(0.0, [value - lower, upper - value])
-                axes.errorbar(value, places, xerr=bars, fmt=marker, capsize=4.0, color=color, label=label)
+                axes.errorbar(value, places, xerr=bars, fmt=shape, capsize=4.0, color=color, label=label)
         axes.set_yticks(range(len(rows)), [_short(sweep, row.second, row.point) for row in rows])
         axes.set(ylim=(len(rows) - 0.5, -0.5), ylabel=_meaning(sweep))
         axes.axvline(0.0, color="0.3", linewidth=0.8)
-        axes.set_xlabel(f"passes more than {sweep.baseline} [points], {sweep.confidence:.0%} interval")
+        axes.set_xlabel(f"success minus that of {sweep.baseline} [% of members], {sweep.confidence:.0%} interval")
         axes.grid(alpha=0.3, axis="x")
         legend_below(axes, ncols=2)
     return grid.ravel()
 
 
 def plot_causes(sweep: Sweep, path: FilePath | None = None, *, figure: Any = None) -> np.ndarray:
-    """Draw which members pass over the two inputs that explain most of it, in the worst cell in which some pass."""
+    """Draw which members pass, over the two inputs that best explain it, in the worst cell in which some pass."""
     shares = [(sweep.passed(cell).mean(), cell.index, cell) for cell in _ran(sweep)]
     share, _, cell = min([each for each in shares if 0.0 < each[0] < 1.0], default=(0.0, 0, sweep.cells[0]))
     rows = sweep.causes(cell.case.name, cell.point)[:2] if share else []
@@ -217,7 +217,7 @@ def plot_causes(sweep: Sweep, path: FilePath | None = None, *, figure: Any = Non
                 x[chosen], y[chosen], marker, color=color, markersize=4.0, label=f"{label}: {int(chosen.sum()):,}"
             )
         words = [f"{labels[row['input']]}: explains {100.0 * row['share']:.3g} % of success" for row in rows]
-        axes.set(xlabel=words[0], ylabel=words[1] if len(rows) > 1 else "member")
+        axes.set(xlabel=words[0], ylabel=words[1] if len(rows) > 1 else "member index")
         axes.set_title(wrapped(f"Worst cell{some}: {cell.name}", axes.figure))
         axes.legend()
     return grid.ravel()
@@ -226,13 +226,13 @@ def plot_causes(sweep: Sweep, path: FilePath | None = None, *, figure: Any = Non
 def plot_responses(
     sweep: Sweep, path: FilePath | None = None, of: str = "", members: int = MOST_PATHS, *, figure: Any = None
 ) -> np.ndarray:
-    """Draw fans of what is tracked over time, in the best cell and the worst, of members that are run again.
+    """Draw fans of a tracked quantity or of its error over time, in the best and the worst cell, for members run again.
 
-    Of equals it is the first one; where all are equal, the cases at the first point of the grid.
+    If several cells are equally good, the first is drawn; if all are, the cases at the first point of the grid.
 
-    of: "depth", "heading", "speed", "north" or "east"; or a distance from what is wanted, "position", "attitude" or
-        "cross_track". By default what that metric is of whose medians differ most between cases there, in interquartile
-        ranges; the first one of equals.
+    of: "depth", "heading", "speed", "north" or "east"; or an error, "position", "attitude" or "cross_track". By default
+        the quantity of the metric whose medians differ most between the drawn cells, relative to the interquartile
+        ranges.
     """
     cells = _extremes(sweep)
     of = of or _tracked(sweep, [cell for _, cell in cells])
@@ -249,8 +249,8 @@ def plot_responses(
             axes.set_title(wrapped(title, axes.figure, 0.9 / columns))
         grid[0, 0].figure.supxlabel("time [s]")
         unit = tracking.error(of, False).unit
-        away = "" if of in tracking.CHANNELS[False] else " from what is wanted"
-        grid[0, 0].figure.supylabel(f"{of}{away} [{unit}]: {count} members")
+        away = "" if of in tracking.CHANNELS[False] else "error of "
+        grid[0, 0].figure.supylabel(f"{away}{of} [{unit}]: {count} members")
         if of == "depth":
             point_down(grid[0, -1])
         grid[0, 0].legend()
@@ -279,7 +279,7 @@ def _tracked(sweep: Sweep, cells: list[SweepCell]) -> str:
 
 
 def _response(axes: Any, sweep: Sweep, cell: SweepCell, of: str, count: int) -> None:
-    """Draw the fan of the first members of a cell, and what is wanted of a number."""
+    """Draw the fan of the first members of a cell, and the reference of the quantity."""
     assert cell.fleet is not None
     assert cell.fleet.scene.controller is not None
     duration = float(sweep.setup.settings.get("t1") or cell.fleet.scene.run.duration or 0.0)
@@ -292,7 +292,7 @@ def _response(axes: Any, sweep: Sweep, cell: SweepCell, of: str, count: int) -> 
     draw_bands(axes, result.time, numbers.reshape(len(result.time), -1), under_way(result))
     if channel is not None:
         wanted = np.median(channel.reference(result.samples), axis=1)
-        axes.plot(result.time, wanted, "k:", linewidth=1.0, label="wanted")
+        axes.plot(result.time, wanted, "k:", linewidth=1.0, label="reference")
 
 
 def plot_rare(sweep: Sweep, path: FilePath | None = None, *, figure: Any = None) -> np.ndarray:
@@ -326,7 +326,7 @@ PICTURES: dict[str, Callable[[Any, Path], Any]] = {
 
 
 def pictures(sweep: Sweep) -> dict[str, Callable[[Any, Path], Any]]:
-    """Return the functions that draw a sweep, by the name of the file: of one case no differences."""
+    """Return the functions that draw a sweep, by the name of the file; without differences if there is one case."""
     absent = {"differences.png"} if len(sweep.cases) < 2 else set()
     absent |= {"rare.png"} if sweep.rares is None else set()
     return {name: draw for name, draw in PICTURES.items() if name not in absent}

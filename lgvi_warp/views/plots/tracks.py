@@ -33,11 +33,11 @@ LABEL_PLACES = 201
 
 @picture
 def paths(result: Result, most: int = MOST_PATHS, *, ax: Any = None, path: FilePath | None = None) -> Any:
-    """Draw paths of some members from the side: depth against horizontal distance from the mean start.
+    """Draw paths of some members from the side: depth against horizontal distance from the members' mean start.
 
     Args:
         result: A result with positions, in memory or in a store.
-        most: The most members to draw, which `lw.select_members` chooses; default 12.
+        most: Largest number of members to draw, chosen by `lw.select_members`; default 12.
 
     Returns:
         The axes.
@@ -69,11 +69,11 @@ def draw_paths(axes: Any, result: Result, most: int = MOST_PATHS) -> None:
 
 @picture
 def plan_view(result: Result, most: int = MOST_PATHS, *, ax: Any = None, path: FilePath | None = None) -> Any:
-    """Draw paths of some members from above: north up, east to the right, in the same scale, with the contours of the floor.
+    """Draw paths of some members from above: north up, east to the right, equal scales, depth contours of the floor.
 
     Args:
         result: A result with positions, in memory or in a store.
-        most: The most members to draw, which `lw.select_members` chooses; default 12.
+        most: Largest number of members to draw, chosen by `lw.select_members`; default 12.
 
     Returns:
         The axes.
@@ -149,15 +149,15 @@ def phase(
 
     Args:
         result: A result with the samples that the quantities need, in memory or in a store.
-        of: The horizontal and the vertical quantity; default depth and the velocity downwards.
-        most: The most members to draw, which `lw.select_members` chooses; default 12.
+        of: The horizontal and the vertical quantity; default depth and downward velocity.
+        most: Largest number of members to draw, chosen by `lw.select_members`; default 12.
 
     Returns:
         The axes.
 
     Raises:
-        NothingToDraw: Samples that are needed were not kept, or no member has a finite start.
-        SceneError: A quantity is not known, or has several components.
+        NothingToDraw: Required samples were not kept, or no member has a finite start.
+        SceneError: A quantity is unknown, or has several components.
     """
     names = listed("of", of, "two quantities")
     if len(names) != 2:
@@ -219,12 +219,12 @@ BODY_AXES = ("forward (x)", "starboard (y)", "down (z)")
 
 @picture
 def attitude(result: Result, most: int = MOST_AXES, *, ax: Any = None, path: FilePath | None = None) -> Any:
-    """Draw the directions of the body's axes of some members, as paths on the unit sphere, up at the top.
+    """Draw the directions of the body axes of some members as paths on the unit sphere; the top of the sphere is up.
 
     Args:
         result: A result with attitudes, in memory or in a store.
-        most: The most members to draw; default 1.
-        ax: Matplotlib axes with projection="3d" to draw on; default None: those of a new figure.
+        most: Largest number of members to draw; default 1.
+        ax: Matplotlib axes with projection="3d" to draw on; default None: the axes of a new figure.
 
     Returns:
         The axes.
@@ -250,7 +250,7 @@ def attitude(result: Result, most: int = MOST_AXES, *, ax: Any = None, path: Fil
                     line_style |= {"linestyle": "", "marker": "osD"[k], "markersize": 3}
                 axes.plot(*line.T, label=name if i == 0 else None, **line_style)
                 axes.plot(*line[:1].T, "osD"[k], color=COLORS[k], markeredgecolor="black", markersize=8)
-        axes.set_title(f"Where body axes of {some_of(result, len(choice.members))} point; marks: start")
+        axes.set_title(f"Directions of the body axes of {some_of(result, len(choice.members))}; marks: start")
         axes.legend(loc="upper center", bbox_to_anchor=(0.5, 0.04), ncols=3, frameon=False)
     return axes
 

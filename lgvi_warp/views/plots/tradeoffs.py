@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Speed against accuracy of methods: the front in colour with names at its lines, all others in grey."""
+"""Cost against error of methods: the methods on the Pareto front in colour, all others in grey."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ CHANCE = 1.4
 
 @picture
 def tradeoff(found: Tradeoff, of: str | None = None, *, figure: Any = None, path: FilePath | None = None) -> np.ndarray:
-    """Draw error against cost, with a line for each method and precision, and the biases of statistics.
+    """Draw cost against error, one line for each method and precision, and biases of statistics against the step.
 
-    Methods with a setting on the front, which are cheapest for some error, are in colour and named at their lines; all others
-    are grey.
+    A method that is the cheapest for some error (on the Pareto front) is drawn in colour, with its name at its line.
+    All other methods are grey.
 
     Args:
-        found: Measurements of `lw.tradeoff`.
-        of: Quantity of the errors, "position" and so on; default that of the trade-off.
+        found: Measurements from `lw.tradeoff`.
+        of: Quantity whose error is drawn, such as "position"; default None: the quantity of the trade-off.
 
     Returns:
         The axes of costs and of biases, shape (2,).
@@ -93,16 +93,16 @@ def _words(costs: Any, biases: Any, tradeoff: Tradeoff, of: str, any_shown: bool
     """Label the axes, and say why one is empty."""
     figure = costs.figure
     costs.set(xlabel=f"largest error of {of} [{tradeoff.units[of]}], up to {tradeoff.until:g} s",
-              ylabel="cost [us of a core per vehicle and second]", title="Cost of accuracy")  # fmt: skip
+              ylabel="cost [us of core time per vehicle and second]", title="Cost of accuracy")  # fmt: skip
     biases.set(xlabel="step [s]", ylabel=f"bias / standard error of {tradeoff.members} members",
                title=wrapped(f"Bias of the mean of {of} up to {tradeoff.t1:g} s", figure, 0.4))  # fmt: skip
     for axes, drawn, reason in (
         (
             costs,
             any_shown,
-            "no error of members: noise acts, the reference is not good enough, or all settings are exact",
+            "no errors to draw: noise acts, the reference is too inaccurate, or all settings are exact",
         ),
-        (biases, any(point.biases for point in tradeoff.measurements), "no statistics: there is one member"),
+        (biases, any(point.biases for point in tradeoff.measurements), "no statistics: the fleet has one member"),
     ):
         if drawn:
             axes.set(xscale="log", yscale="log")
@@ -115,10 +115,10 @@ def _words(costs: Any, biases: Any, tradeoff: Tradeoff, of: str, any_shown: bool
         costs.invert_xaxis()
     if any(point.biases for point in tradeoff.measurements):
         biases.axhline(CHANCE, color="black", linewidth=0.8, linestyle=":")
-        biases.text(1.01, CHANCE, "chance", va="center", transform=biases.get_yaxis_transform())
+        biases.text(1.01, CHANCE, "limit of\nchance", va="center", transform=biases.get_yaxis_transform())
     sample = f"{tradeoff.members} members, 0 to {tradeoff.t1:g} s"
-    without = f"no reading of {', '.join(tradeoff.missing)}; " if tradeoff.missing else ""
-    text = f"{without}{sample}; reference {tradeoff.reference}; better is to the right and down"
+    without = f"no measurement of {', '.join(tradeoff.missing)}; " if tradeoff.missing else ""
+    text = f"{without}{sample}; reference {tradeoff.reference}; better: lower right"
     figure.suptitle(wrapped(text, figure))
 
 

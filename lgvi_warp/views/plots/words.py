@@ -32,7 +32,7 @@ WORDS = {
     "euler[2]": "yaw",
 }
 COMPONENT = re.compile(r"(?<![.\w])[a-z_]+\[\d\]")
-HINT = "start and end alone were kept: give SaveAt(every=...) for the motion between"
+HINT = "only start and end were kept: SaveAt(every=...) keeps the motion between them"
 
 
 def label_of(of: Quantity) -> str:

@@ -37,8 +37,8 @@ def record(
 
     Hulls of the vehicle's shape are drawn for the members and times of `lgvi_warp.select_members`. When a member ends,
     its hull takes the colour of its outcome. Curves show medians and quantiles over the members that still run at each
-    time. Another recording of the same run has the same ids of recording and application, by which the viewer
-    distinguishes recordings and layouts.
+    time. All recordings of one run have the same recording id and application id; the viewer uses these ids to
+    tell recordings and layouts apart.
 
     Args:
         result: A result with position, attitude and velocity, in memory or in a store; or a mapping of names to

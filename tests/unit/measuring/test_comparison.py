@@ -739,7 +739,7 @@ def test_what_was_asked_for_and_has_no_reading_is_named(scene):
 
     figure = plt.figure()
     lw.plots.tradeoff(found, figure=figure)
-    assert "no reading of rk4" in figure.get_suptitle().replace("\n", " ")
+    assert "no measurement of rk4" in figure.get_suptitle().replace("\n", " ")
     plt.close(figure)
 
 

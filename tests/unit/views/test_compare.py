@@ -55,7 +55,7 @@ def test_a_mean_has_its_interval():
     np.testing.assert_allclose(axes.lines[0].get_ydata(), DEPTH.mean(axis=1))
     np.testing.assert_allclose(edges(axes.collections[0]), DEPTH[0].mean() + np.array([-1.0, 1.0]))
     legend = axes.get_legend()
-    assert axes.lines[0].get_label() == f"a: {N} members, mean and its 95% interval"
+    assert axes.lines[0].get_label() == f"a: {N} members, mean and 95% confidence interval"
     assert legend.get_title().get_text() == ""
 
 

@@ -93,7 +93,7 @@ def test_factors_without_effect_take_no_rows():
     for axes, widths in ((left, [0.7, 0.0]), (right, [0.4, 0.6])):
         bars = [bars for bars in axes.containers if hasattr(bars, "patches")]
         assert [[bar.get_width() for bar in each] for each in bars] == [widths] * 2
-    assert left.figure.get_suptitle().replace("\n", " ").endswith("; without any effect: b")
+    assert left.figure.get_suptitle().replace("\n", " ").endswith("; factors without effect: b")
     found.first = found.total = found.half = 0.0 * numbers
     assert len(lw.plots.sensitivity(found)[0].get_yticklabels()) == 3
 
@@ -193,6 +193,6 @@ def test_tables_of_a_study(tmp_path):
         assert f"{head}<h2>A map</h2><img " in text
         assert f"<h2>Table</h2>{more}<table><tr><th>h</th></tr><tr><td>0</td></tr>" in text
         assert text.count("<td>") == 200
-        assert "<h2>How it was made</h2><pre>{\n &quot;of&quot;: 3\n}</pre>" in text
+        assert "<h2>Settings of the study</h2><pre>{\n &quot;of&quot;: 3\n}</pre>" in text
     (tmp_path / "stability.csv").write_text("")
     assert "<h2>Table</h2><table></table>" in page(tmp_path, tmp_path)

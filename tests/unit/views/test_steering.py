@@ -118,7 +118,7 @@ def test_an_angle_of_members_that_point_all_ways_is_left_out(name):
     heading, told = SCATTERED[name]
     path = np.ones((61, 201, 3)) * TIME[:, None, None]
     axes = lw.plots.summary(made(path, TIME, attitude=turned(heading)))[2]
-    yaw = next(line for line in axes.lines if line.get_label() == "yaw; gaps: all ways").get_ydata()
+    yaw = next(line for line in axes.lines if line.get_label() == "yaw; gaps: no mean direction").get_ydata()
     np.testing.assert_array_equal(np.isfinite(yaw), told)
     if name == "the longer the more":
         np.testing.assert_allclose(yaw[told], 0.0, atol=1e-6)

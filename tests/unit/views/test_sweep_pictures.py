@@ -24,7 +24,7 @@ def bars(container):
 
 
 def test_boxes_beyond_the_most_are_counted():
-    for count, words in ((20, "case, k"), (21, "case, k; 2 more are not shown")):
+    for count, words in ((20, "case, k"), (21, "case, k; 2 more cells are not shown")):
         (axes,) = sweeps.plot_metrics(swept(half, {"k": list(range(count))}))
         assert axes.get_xlabel() == words
         assert len(axes.patches) == 40
@@ -45,7 +45,7 @@ def without_causes(*explained):
 
 def test_one_cause_is_drawn_over_the_members():
     (axes,) = sweeps.plot_causes(without_causes("delay"))
-    assert axes.get_ylabel() == "member"
+    assert axes.get_ylabel() == "member index"
     assert axes.lines[0].get_ydata().tolist() == list(range(16))
     assert axes.lines[0].get_xdata().tolist() == [i**2 for i in range(16)]
 
@@ -106,10 +106,10 @@ def test_responses_of_a_distance_and_their_times():
     # 800 ticks are too many: every fourth.
     save = lw.SaveAt(every=2.0, fields=("position", "reference_position"))
     assert [asked[1::2] for asked in sweep.asked] == [(range(N), save)]
-    assert axes.figure.get_supylabel() == "position from what is wanted [m]: 40 members"
+    assert axes.figure.get_supylabel() == "error of position [m]: 40 members"
     assert not axes.yaxis_inverted()
     lines = {line.get_label(): line for line in axes.lines}
-    assert "wanted" not in lines
+    assert "reference" not in lines
     assert set(lines["median"].get_ydata()) == {5.0}
 
 

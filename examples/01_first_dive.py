@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A first dive: 1,000 vehicles that differ a little dive for 60 seconds; a picture and a recording.
+"""A first dive: 1,000 vehicles with slightly different numbers dive for 60 seconds.
 
-Mass, heading and thrust are not known exactly. The ellipse holds two standard deviations of the places north and east after
-60 s; `rerun 01_first_dive.rrd` plays the recording.
+Mass, heading and thrust are uncertain. The ellipse shows two standard deviations of the positions north and east after
+60 s. `rerun 01_first_dive.rrd` plays a recording of the vehicles.
 """
 
 import numpy as np

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A REMUS 100 mission: three legs, the last ones deeper, in a current that no vehicle knows.
+"""A REMUS 100 mission: three legs, the last two deeper, in a current that no vehicle measures.
 
-200 vehicles sail by dead reckoning of their course alone: a line of sight with an integral holds them on the legs, although
-the current differs from vehicle to vehicle by up to a third of their speed.
+Line-of-sight guidance with an integral (`ilos`) holds 200 vehicles on the legs. The current differs from vehicle to
+vehicle, and reaches a third of their speed.
 """
 
 import numpy as np

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Your own force, in one file: a dock that draws vehicles in.
 
-The function runs in the kernel, for all vehicles of a packet at once. `lw.laws.check_law` first compares it and its potential.
+A function of this file runs in the kernel. Before the run `lw.laws.check_law` compares its force with its potential.
 """
 
 from dataclasses import dataclass

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Waves and a tether: buoys below the surface, moored to the sea floor.
 
-The waves move the water, the water moves the buoys, and the mooring of each pulls where it is taut. The phases of the waves
-differ from member to member: 300 draws of the same sea. What the moorings pull is a quantity of the user.
+Waves move the water and the buoys, and a mooring pulls its buoy while it is taut. The phases of the waves differ from
+member to member: 300 realisations of one sea. The script defines the pull of a mooring as its own quantity.
 """
 
 import numpy as np
@@ -33,7 +33,7 @@ fleet = lw.Ensemble(
 
 
 def pull(samples, members=None):
-    """What the mooring pulls (k, n) [N]."""
+    """Pull of the mooring (k, n) [N]."""
     foot = samples["position"] + samples["attitude"] @ FOOT
     return STIFFNESS * np.maximum(np.linalg.norm(foot - ANCHOR, axis=-1) - LENGTH, 0.0)
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Noise and statistics: water that wanders, and estimates with intervals that need no samples.
+"""Noise and statistics: a random current, and estimates with confidence intervals that need no samples.
 
-Each of 4,000 vehicles drifts in a current of its own, a random process with a memory of a minute. The statistics are gathered
-while the run goes on: `keep="none"` stores no sample, so that a million members would need no more memory.
+Each of 4,000 vehicles drifts in its own random current, with a time constant of a minute. The run computes statistics
+block by block. `keep="none"` stores no samples, so a million members would need little more memory.
 """
 
 import lgvi_warp as lw

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Sensitivity: which of the inputs that nobody knows exactly matter for where a vehicle ends up.
+"""Sensitivity: the uncertain inputs that matter for the final position and speed of a vehicle.
 
-Sobol indices say what part of the variance each input causes alone (S1) and with all its interactions (ST). Buoyancy decides
-how deep the vehicle is; the current decides how far east it is; together with the start they decide the speed.
+Sobol indices give the share of the variance that each input causes alone (S1) and with all its interactions (ST).
+Buoyancy determines the depth, and the current determines the distance east. The north current dominates the speed.
 """
 
 import lgvi_warp as lw

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Speed against accuracy: what each method costs for each error, for this scene on this machine.
+"""Speed against accuracy: cost and error of many settings, for one scene on one machine.
 
-`lw.tradeoff` runs a sample of the fleet by many methods, steps and precisions against a reference that two runs agree on.
-The front names what is cheapest; `lw.suggest` takes one setting from such measurements.
+`lw.tradeoff` runs members with many methods, steps and precisions. Two independent runs confirm the reference.
+The front has the cheapest setting for each error. `lw.suggest` chooses one setting by such measurements.
 """
 
 import lgvi_warp as lw

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where it breaks: for which steps and rates of turn each method is accurate, bounded, flagged, failed or silently wrong.
+"""Where it breaks: steps and rates of turn where methods are accurate, bounded, flagged, failed or silently wrong.
 
-Each cell of the map is a few runs from starts turned at random; its class is that of the worst. The lines are limits known
-from analysis, which the package warns of before and during a run.
+Each cell of the map has four runs, three of them from random starts, and the class of the worst run. The lines are
+analytic limits of the methods. The package warns of these limits before and during a run.
 """
 
 from collections import Counter

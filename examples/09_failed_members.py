@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Failed members, looked at one by one: which ones failed, why, and what would have helped.
+"""Failed members, looked at one by one: which members failed, why, and what would have helped.
 
-A step of 0.5 s is too long for vehicles that turn fast. A member that fails keeps its last good state; all others go on. The
-failed members run again with the same draws: with a shorter step, and with steps that are divided where they have no solution.
+A step of 0.5 s is too long for vehicles that turn fast. A failed member keeps its last good state; all others continue.
+The failed members run again with a shorter step. Then the fleet runs with `on_failure="substep"`, which divides steps.
 """
 
 from pathlib import Path
@@ -17,7 +17,7 @@ fleet = lw.Ensemble(scene, members=400, seed=1, vary={"start.angular_velocity": 
 
 
 def plot(rates, failed, path):
-    """Rates of turn at the start: bars of all members, the part in front of those that failed."""
+    """Plot rates of turn at the start: bars of all members, and in front of them bars of the failed members."""
     figure = Figure(figsize=(9.0, 5.0), layout="constrained")
     axes = figure.subplots()
     bins = np.linspace(0.0, rates.max(), 30)

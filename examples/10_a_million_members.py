@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A million members: where a fleet ends up, to a millimetre of the mean, in the memory of a few thousand.
+"""A million members: the mean depth of a fleet to a millimetre, in little memory.
 
-Samples of a million members would fill gigabytes. Statistics are gathered while blocks of members run, and `keep="none"`
-stores nothing else; memory does not grow with the number of samples, and the bits do not depend on the number of threads.
+Samples of a million members would fill gigabytes. The run computes statistics block by block, and `keep="none"` stores
+no samples. Memory does not grow with the number of samples, and results have the same bits for any number of threads.
 """
 
 import time

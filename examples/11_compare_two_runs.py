@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Compare two runs: the same 300 vehicles, with the same ballast and the same waves, under two depth controllers.
 
-The draws of a member depend on the seed and on its number alone, so that the difference of the two runs, member by member, is
-that of the controllers. Its interval is far narrower than the spread of the fleet.
+The draws of a member depend on the seed and the member's index alone. So the two runs of a member differ only by the
+controller. The interval of their mean difference is far narrower than the spread of the fleet.
 """
 
 import numpy as np
@@ -18,7 +18,7 @@ vary = {
 
 
 def fleet(ki):
-    """Vehicles whose law of depth has this gain of its integral."""
+    """Build a fleet whose depth law has this integral gain."""
     controller = lw.Controller(
         period=0.1,  # s between ticks
         guidance=[lw.control.SetPoint(depth=WANTED, heading=0.0)],

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Compare with another simulator: the same vehicle in SciPy, by equations written down anew.
+"""Compare with another simulator: the same vehicle in SciPy, by independently written equations.
 
-Newton and Euler's equations of a body with added mass, weight, buoyancy and drag, with quaternions, by DOP853 in steps of at
-most 10 ms: its error estimate misses the kinks of |v| v, and in longer steps it is 3.5e-8 m off. The difference of the two
-programs shrinks with the step as the order of the method says: it is the error of the step, and not a difference of the
+DOP853 solves the Newton-Euler equations of a body with added mass, weight, buoyancy and drag. Its steps are at most
+10 ms: its error estimate misses the kinks of |v| v, and with longer steps it is 3.5e-8 m off. The difference of the two
+programs decreases with the step at the order of the method. So it is the error of the step, not a difference of the
 models. Put your simulator in the place of `other`.
 """
 

@@ -23,8 +23,8 @@ PICTURES = ROOT / "docs" / "gallery"
 PAGE = ROOT / "docs" / "gallery.md"
 HEAD = """# Gallery
 
-Twelve scripts of less than 80 lines, `examples/01_first_dive.py` and so on. Each prints its numbers and writes its picture
-into the folder where it is started. How long something took was measured on two shared cores of an AMD EPYC. Examples of
+The gallery has twelve scripts of less than 80 lines, from `examples/01_first_dive.py` on. Each script prints its numbers
+and writes its picture into the current folder. Times were measured on two shared cores of an AMD EPYC. Examples of
 [controllers](controllers/README.md) are in `examples/controllers/`. Written by `make gallery`; do not edit.
 """
 

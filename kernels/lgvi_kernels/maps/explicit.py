@@ -398,6 +398,6 @@ def make_explicit(spec, types, everything, velocities, slope):
         return make_ride(step, carried) if carried else step
     errors = make_errors(Rates, [make_moves(along, row, None) for row in method.errors])
     step = make_adaptive(
-        stages, finish, errors, method.estimate, spec.width, real, timed, copy_memory if kept else None, used
+        stages, finish, errors, method.estimate, spec.width, real, timed, copy_memory if kept else None, last, used
     )
     return make_ride(step, carried) if carried else step

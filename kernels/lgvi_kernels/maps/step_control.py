@@ -113,13 +113,13 @@ def make_verdicts(width, real):
     return worst_of, given_up
 
 
-def make_adaptive(stages, finish, errors, estimate, width, real, timed, copy_memory, used=None):
+def make_adaptive(stages, finish, errors, estimate, width, real, timed, copy_memory, recall, used=None):
     """From one step of the grid to the next, by steps that the packet's worst lane decides.
 
     docs/theory/runge_kutta.md, (K8).
 
-    copy_memory: (constants, source, target), where a law remembers (see maps/explicit.py); else None. used: as of
-        make_fixed there.
+    copy_memory: (constants, source, target), where a law remembers (see maps/explicit.py); else None. recall, used:
+        as of make_fixed there.
     """
     # Of PI control: this exponent is that of the step's own error, BETA that of the error before.
     power = 0.75 * BETA - 1.0 / estimate
@@ -170,6 +170,8 @@ def make_adaptive(stages, finish, errors, estimate, width, real, timed, copy_mem
                     stride = taken * factor
                 if wp.static(timed):
                     x.time = start + wp.float64(done)
+                if wp.static(recall is not None):
+                    x = recall(x, c, taken)
             else:
                 stride = taken * wp.min(real(1.0), factor)
                 if wp.static(copy_memory is not None):

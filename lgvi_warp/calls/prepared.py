@@ -288,10 +288,8 @@ class Prepared:
             status = np.zeros(len(values), np.uint8) if status is None else status
             found = outputs(self._of, [numbers], [status], {})
         values = found.values
-        if found.failed.any():
-            if self._refuse:
-                raise FailedMembers([found.text('fix the failing members, or take NaN for them: failed="nan"')])
-            values = np.where(found.failed[:, None], np.nan, values)
+        if self._refuse and found.failed.any():
+            raise FailedMembers([found.text('fix the failing members, or take NaN for them: failed="nan"')])
         return values[:, 0] if values.shape[1] == 1 else values
 
 
@@ -373,7 +371,8 @@ def prepare(
         statistics: Statistics gathered over the members of each call, in result.statistics; by default none.
         levels: Whether X holds probability levels in (0, 1), which the distributions convert to values. False, the
             default: X holds the values themselves. Joint distributions need levels.
-        failed: "refuse", the default, raises an error if members fail; "nan" sets their quantities to NaN. Only with `of`.
+        failed: "refuse", the default, raises an error if members fail or quantities are not finite (end_time without that
+            end); "nan" sets all quantities of a failed member to NaN, and leaves the others as they are. Only with `of`.
         common_noise: Whether all members have the same noise of forces and sensors; False by default.
         draws: "drawn", the default: the run draws the noise of forces and sensors from the seed. "given": each call passes
             standard normal numbers, run(X, xi); the attribute `draws` of the prepared run lists the columns of xi.

@@ -49,9 +49,9 @@ class Outputs:
     """Quantities of interest of an ensemble.
 
     Attributes:
-        values: the quantities (n, m) [their units].
+        values: the quantities (n, m) [their units]; NaN for a failure by status, and if not finite.
         labels: names of the quantities (m,).
-        failed: whether each member failed (n,).
+        failed: whether the status of each member is a failure, or a quantity of the member is not finite (n,).
         counts: name of a status -> number of members.
         provenance: scene, settings, versions and machine of the runs.
     """
@@ -191,17 +191,19 @@ def outputs(
     """
     labels = [label for each, columns in zip(of, groups[0], strict=True) for label in each.labels(columns.shape[1])]
     values, status = np.concatenate([np.concatenate(group, axis=1) for group in groups]), np.concatenate(ends)
-    odd = np.concatenate([_not_numbers(of, group) for group in groups])
+    wrong, lost = np.concatenate([_not_numbers(of, group) for group in groups]), failed(status)
+    odd = wrong.any(axis=1)
+    values[wrong | lost[:, None]] = np.nan
     codes = np.unique(status) if status.any() else [Status.OK]
     counts = {Status(int(code)).name.lower(): int((status == code).sum()) for code in codes}
     counts |= {"quantity not finite": int(odd.sum())} if odd.any() else {}
-    return Outputs(values, tuple(labels), failed(status) | odd, counts, content)
+    return Outputs(values, tuple(labels), lost | odd, counts, content)
 
 
 def _not_numbers(of: Sequence[OfResult], numbers: Sequence[np.ndarray]) -> np.ndarray:
-    """Mask of members (n,) with a quantity that is NaN, or infinite where infinity is not allowed."""
+    """Mask (n, m) of the quantities that are NaN, or infinite where infinity is not allowed."""
     odd = [np.isnan(x) if each.may_be_infinite else ~np.isfinite(x) for each, x in zip(of, numbers, strict=True)]
-    return np.asarray(np.concatenate(odd, axis=1).any(axis=1))
+    return np.asarray(np.concatenate(odd, axis=1))
 
 
 def values_of(result: Any, fleet: Ensemble, of: Sequence[OfResult]) -> list[np.ndarray]:

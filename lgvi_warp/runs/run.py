@@ -19,6 +19,7 @@ from lgvi_warp.engine.executors.threads import Threads
 from lgvi_warp.engine.keepers.final import Finals, Rows
 from lgvi_warp.engine.keepers.memory import Outcomes, Samples
 from lgvi_warp.engine.keepers.observation import Observation, Observing
+from lgvi_warp.engine.keepers.speeds import Speeds
 from lgvi_warp.engine.loop import Merged, RunProgress, run_blocks
 from lgvi_warp.engine.outcome import MemberStatus
 from lgvi_warp.engine.plan import Plan
@@ -82,7 +83,7 @@ def run_plan(
 
     apart, statistics = gathered.observed.apart or not isinstance(runner, Threads), bool(gathered.observing.keepers)
     runs = parts(total, plan.grid.steps, threads, apart, statistics)
-    if not (apart or statistics) and on_block is None and single_block.fits(plan, runs):
+    if gathered.speeds is None and not (apart or statistics) and on_block is None and single_block.fits(plan, runs):
         gathered.take_all(*single_block.run_single_block(plan, gathered.names, warned, overall.at, final))
         return ended(total)
     work = Work(plan, gathered.keepers if slopes is None else (*gathered.keepers, slopes), warned=warned)
@@ -110,6 +111,8 @@ class _Gathered:
     ):
         self.plan, self.observed, self.fields, self.known = plan, observed, fields, known
         self._finals = Finals() if final else None
+        # Samples in memory tell of implausible speeds.
+        self.speeds = None if observed.samples or known else Speeds()
         self.observing = Observing(observed, plan.grid.times, plan.ensemble.members, plan.ensemble.replicates)
         self._whole: tuple[dict[str, np.ndarray], MemberStatus, Rows] | None = None
 
@@ -124,8 +127,8 @@ class _Gathered:
     def keepers(self) -> tuple[Any, ...]:
         """The keepers of a run by blocks: for outcomes, for samples if these are kept, and for statistics."""
         samples = (Samples(self.plan, self.fields),) if self.observed.samples else ()
-        finals = (self._finals,) if self._finals is not None else ()
-        return (Outcomes(self.plan), *samples, *self.observing.keepers, *finals)
+        others = (keeper for keeper in (self._finals, self.speeds) if keeper is not None)
+        return (Outcomes(self.plan), *samples, *self.observing.keepers, *others)
 
     def take_all(self, samples: dict[str, np.ndarray], outcome: MemberStatus, rows: Rows) -> None:
         """Store data gathered without keepers: samples and outcome of all members, and the rows of their final states."""
@@ -184,7 +187,8 @@ class _Gathered:
             estimates, remarks = self.observing.read(content["ensemble"], of_members["status"])
         # The arrays have room for all members; beyond the last one that ran nothing was written.
         histories, scene = self.histories(slice(n)), plan.ensemble.scene
-        on_the_way = plausibility.on_the_way(histories).messages(n) if self.known is None else ()
+        odd = self.speeds.found if self.speeds else plausibility.on_the_way(histories)
+        on_the_way = odd.messages(n) if self.known is None else ()
         return Result(
             time=plan.grid.times,
             samples=histories,

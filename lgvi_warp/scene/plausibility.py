@@ -356,6 +356,20 @@ def on_the_way(samples: Mapping[str, np.ndarray]) -> Oddities:
     return gathered([text], 0, len(fast))
 
 
+def at_the_end(start: np.ndarray, speed: np.ndarray, first: int) -> Oddities:
+    """Members that begin below the limit of speed and end beyond it.
+
+    start: velocities (n, 3) [m/s] at the start. speed: (n,) [m/s] at the end, at least. first: index of the first member.
+    """
+    limit = LIMITS["speed"].value
+    with np.errstate(all="ignore"):
+        fast = (speed > limit) & (_speed(start) < limit)
+    text: OddityCheck = (
+        "velocity", fast, lambda i: f"{speed[i]:.4g} m/s or more at the end is beyond {limit:g} m/s: a unit, or the step?"
+    )  # fmt: skip
+    return gathered([text], first, first + len(fast))
+
+
 def _later(samples: np.ndarray | None, limit: float) -> tuple[np.ndarray, np.ndarray]:
     """Return for each member (n,) whether its speed exceeded the limit only after the start, and its largest speed."""
     if not isinstance(samples, np.ndarray) or len(samples) < 2:

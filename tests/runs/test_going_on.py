@@ -65,6 +65,8 @@ def check(fleet, method, **settings):
     whole, last = one_run(fleet, method, **settings), in_pieces(fleet, method, **settings)
     assert differences(whole, last) == []
     assert last.time.tolist() == pytest.approx([whole.time[-2], whole.time[-1]])
+    # The first sample of a piece is that at the end of the piece before.
+    assert [name for name in whole.samples if not equal(whole.samples[name][-2], last.samples[name][0])] == []
     return whole
 
 

@@ -96,6 +96,13 @@ def make_opening(spec):
     _, _, first_signals = make_signals(types)
 
     @wp.func(inline=True)
+    def first_of(x: wp.ref[State], c: wp.ref[Constants], monitor: wp.ref[Monitor], k0: int, h: wp.float64, opening: real,
+                 frozen: Lane):  # fmt: skip
+        if wp.static(reports):
+            note_actuators(x, c, monitor, h, k0, opening)
+        first_signals(c, monitor, frozen)
+
+    @wp.func(inline=True)
     def opening_of(x: wp.ref[State], c: wp.ref[Constants], monitor: wp.ref[Monitor], k0: int, k1: int, begins: int,
                    h: wp.float64, opening: real, frozen: Lane):  # fmt: skip
         if begins == wp.static(STARTS) or begins == wp.static(GOES_ON_WITHOUT_LEAD):
@@ -111,15 +118,17 @@ def make_opening(spec):
             # A launch without steps measures alone: so the host sees the start. Such a kernel has no lead.
             x.alarm = Alarm()
             if k1 > k0:
+                if begins > 0:
+                    # A run that goes on starts with the signals that the part before left.
+                    first_of(x, c, monitor, k0, h, opening, frozen)
                 if k0 % monitor.every == 0:
                     respond(x, c, monitor, k0, h)
             else:
                 feed(x, c, monitor, k0, h, real(0.0))
         if wp.static(controlled):
             if begins > 0:
-                if wp.static(reports):
-                    note_actuators(x, c, monitor, h, k0, opening)
-                first_signals(c, monitor, frozen)
+                if k1 == k0 or wp.static(not asked):
+                    first_of(x, c, monitor, k0, h, opening, frozen)
                 if monitor.slots > 0:
                     if begins != wp.static(STARTS) and k0 == monitor.first_tick * monitor.every:
                         recall(x, c, monitor, k0, h, opening)

@@ -59,7 +59,11 @@ class Numbers:
         if count != self._count:
             faults.add("of", f"{count} numbers", "is not a single number", "name one of its entries")
         faults.raise_if_any()
-        return values if len(self._columns) == 1 else values.reshape(len(values), -1)[:, self._columns]
+        if len(self._columns) == 1:
+            return values
+        values = values.reshape(len(values), -1)[:, self._columns]
+        # A member without one of its numbers cannot be compared.
+        return np.where(np.isnan(values).any(axis=1, keepdims=True), np.nan, values)
 
 
 def _names_a_metric(of: Any) -> bool:

@@ -134,12 +134,14 @@ class Runner:
         """
         few = {"members": fleet.members, "seed": fleet.seed, "varied": sorted(fleet.varied_names)}
 
-        def known(plan: Plan) -> tuple[dict[str, Any], tuple[str, ...]]:
+        def context_of(plan: Plan) -> tuple[dict[str, Any], tuple[str, ...]]:
             content = plan.shared("provenance", {}, lambda numbers: provenance_but_scene(plan, self.request.observed))
             return {**content, "ensemble": few, **starts_at(plan)}, plan.grid.messages
 
         plan = self.plan(fleet)
-        return self.request.run(plan, fields=plan.fields, progress=progress, known=known, warned=warned, final=final)
+        return self.request.run(
+            plan, fields=plan.fields, progress=progress, known=context_of, warned=warned, final=final
+        )
 
     def samples(
         self, fleet: Ensemble, progress: Callable[[float], None] | None = None

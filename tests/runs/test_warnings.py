@@ -530,8 +530,8 @@ def test_stiff_drag_is_warned_of_where_it_does_not_grow_with_sizes_and_speeds(te
 
 
 def test_a_motion_that_diverges_into_an_event():
-    # h c / m = 6 and more, far beyond rk4's 2.79: within a few steps members are so fast that they are past the floor. A pushed scene has
-    # no energy to look at.
+    # h c / m = 6 and more, far beyond rk4's 2.79: within a few steps members are so fast that they are past the floor. A scene
+    # that is pushed has no energy to look at.
     scene = lw.Scene(
         lw.Vehicle(10.0, inertia=(1.0, 2.0, 3.0), added_mass=(5.0, 15.0, 10.0), buoyancy=98.0),
         terms=[lw.terms.Drag(linear=(600.0, 600.0, 600.0, 1.0, 1.0, 1.0)), lw.terms.Wrench(force=(0.0, 0.0, 1.0))],

@@ -7,7 +7,7 @@ BIN := $(VENV)/bin
 # Processes that tests start load the bytecode that others left.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: run quick test test-core test-long coverage mutants lint dist docs notebooks gallery pictures bench bench-peers bench-loops clean
+.PHONY: run quick test test-ci test-core test-long coverage mutants lint dist docs notebooks gallery pictures bench bench-peers bench-loops clean
 
 run: $(VENV)/.run
 	$(BIN)/lgvi-warp run examples/paper.toml --out runs/paper
@@ -16,6 +16,10 @@ quick: $(VENV)/.dev
 	$(BIN)/python -m pytest -n auto --dist worksteal -m "not slow and not kernel" tests/unit/$(ROOM)
 
 test: lint
+	$(BIN)/python -m pytest -n auto --dist worksteal -m "not slow and not ci"
+
+# What continuous integration runs: also the tests that compile kernels of their own.
+test-ci: lint
 	$(BIN)/python -m pytest -n auto --dist worksteal -m "not slow"
 
 # Tests of the core in a copy of the tree without lgvi_warp/extensions.

@@ -481,7 +481,7 @@ def main():
         "--record",
         nargs=argparse.REMAINDER,
         metavar="TESTS",
-        help="record what tests run (default: those of make test)",
+        help="record what tests run (default: those of make test-ci)",
     )
     parser.add_argument("--room", action="append", choices=list(rooms()), help="default: every room")
     parser.add_argument("--sample", type=int, default=40)

@@ -15,6 +15,12 @@ from tests.support.disks import Disk
 DESCRIPTORS = "/proc/self/fd"
 
 
+@pytest.fixture(scope="module")
+def collected():
+    """Close the files of other tests, to which nothing refers any more."""
+    gc.collect()
+
+
 @pytest.fixture
 def root(tmp_path):
     """A folder with a file, a folder with a file, a link, a pipe, and a folder that a run may replace."""
@@ -105,11 +111,10 @@ def open_files():
 @pytest.mark.skipif(not os.path.isdir(DESCRIPTORS), reason="the system does not list open files")
 @pytest.mark.parametrize("full", [False, True], ids=["", "full disk"])
 @pytest.mark.parametrize("name", ACTIONS)
-def test_no_descriptor_stays_open(name, full, root):
+def test_no_descriptor_stays_open(name, full, root, collected):
     write_files(root)  # threads and locks that are made once
     for beside in (root / "inner" / "a", root / "inner" / "b"):
         beside.unlink()
-    gc.collect()  # files of tests before this one, which nothing refers to any more
     before = open_files()
     with Disk(disks.full(("synced", ""))) if full else contextlib.nullcontext():
         act(ACTIONS[name], root)

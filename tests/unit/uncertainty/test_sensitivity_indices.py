@@ -412,7 +412,8 @@ def test_outputs_are_of_all_groups_of_members(monkeypatch):
     assert runs[0][0] is fleet
     assert {"threads": 2, "executor": "processes", "h": 0.1}.items() <= runs[0][1].items()
     assert [list(group.indices) for group in runs[1:]] == [[0, 1, 2, 3], [4, 5, 6, 7], [8, 9]]
-    assert found.values[:, 0].tolist() == list(range(10))
+    np.testing.assert_array_equal(found.values[:, 0], [0, 1, 2, 3, 4, np.nan, 6, 7, 8, 9])
+    np.testing.assert_array_equal(found.values[[5, 9], 1], np.nan)
     assert found.labels == ("quantity[0]", "quantity[1]")
     assert np.flatnonzero(found.failed).tolist() == [5, 9]
     assert found.provenance["run"] == 4

@@ -32,6 +32,8 @@ from tests.control.test_loop import (
 from tests.support.loops import twin_body, twin_run
 from tests.support.tools import one
 
+pytestmark = pytest.mark.ci
+
 SPEED, DENSITY = 1.5, 1025.0
 AHEAD = (15.0, 0.0, 0.0)
 # The laws ask for M and N.

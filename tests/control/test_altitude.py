@@ -58,6 +58,7 @@ def readings(result, direction=(0.0, 0.0, 1.0), point=(0.0, 0.0, 0.0)):
     return level / np.sum(down * beam, axis=-1)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(("size", "tilt"), [(0.0, 0.7), (1.0, 0.5), (3.0, 0.3)])
 def test_a_reading_is_exact_where_the_beam_meets_the_floor_once(size, tilt):
     # Slopes up to 3 m in 5 m. The truth: in each cell that the beam crosses, the root of a quadratic.
@@ -140,6 +141,7 @@ def test_a_fault_of_an_altimeter_begins_at_its_time():
     np.testing.assert_allclose(readings(r)[:, 0], 3 * [30.0] + 4 * [4.0], atol=1e-9)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("part", [
     lw.control.Altimeter(direction=[1.0, 0.2, 3.0], point=[0.5, 0.0, 0.1], noise=0.1, every=2, dropout=0.2),
     lw.control.Altitude(altitude=3.0),

@@ -140,6 +140,7 @@ def test_the_sampled_heading_loop():
 MEMBERS = 10_000
 
 
+@pytest.mark.ci
 def test_the_lyapunov_function_rises_no_more_than_a_held_torque_lets_it():
     period, kr, kw, J = 0.2, 2.0, 3.0, np.array(INERTIA)
     rng = np.random.default_rng(11)

@@ -69,6 +69,7 @@ def compared(allocation, n, size, dtype, priorities=(1.0,) * 6):
     return error, best, length, feasible, unmet, made @ EFFECT.T - demand
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("dtype", ["float64", "float32"])
 @pytest.mark.parametrize(
     ("size", "n"), [(1.0, 300), (2.0, 300), *(pytest.param(k, 3000, marks=pytest.mark.slow) for k in (1.0, 2.0))]
@@ -112,6 +113,7 @@ def test_what_is_within_the_limits_is_the_pseudo_inverses_to_the_last_digit():
     np.testing.assert_array_equal(ours[2], 0.0)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("channels", [(4,), pytest.param((0, 4, 5, 6, 7), marks=pytest.mark.slow)])
 def test_lost_thrusters_make_nothing_however_many(channels):
     faults = [Fault(name=f"dead_{c}", of="thrusters", channel=c, time=0.0, gain=0.0, known=True) for c in channels]
@@ -123,6 +125,7 @@ def test_lost_thrusters_make_nothing_however_many(channels):
     assert error.mean() <= 1.01 * best.mean()
 
 
+@pytest.mark.ci
 def test_members_beside_others_keep_their_bits():
     # One that is cut off, and one that is not, in lanes beside each other or alone.
     demands = np.concatenate([drawn(3, 2.0), drawn(3, 0.1)])
@@ -197,6 +200,7 @@ def allocated(numbers, faults, dtype="float64"):
     return np.float64(result.command[0]), np.float64(result.unmet[0])
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("dtype", ["float64", pytest.param("float32", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("edge", EDGES)
 def test_edges(edge, dtype):
@@ -283,6 +287,7 @@ def made_of(frame, demands, priorities, dead, dtype, iterations=100):
     return np.sign(command) * command**2 * strength, np.float64(result.unmet[0]), result
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("dtype", ["float64", "float32"])
 @pytest.mark.parametrize(
     ("frame", "dead", "n"),
@@ -326,6 +331,7 @@ def test_too_few_steps_are_told():
     assert any("1 of 2 members (2 times at most, first in member 0 at 0 s)" in text for text in result.messages)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("priority", [50.0, *(pytest.param(p, marks=pytest.mark.slow) for p in (1.0, 1000.0))])
 def test_a_loop_comes_to_its_place_whatever_the_priorities(priority):
     """A dead thruster that is known, and a current: the pseudo-inverse comes to 1e-6 m and better, and so must this."""

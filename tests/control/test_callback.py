@@ -54,6 +54,7 @@ def test_it_is_the_law_in_the_kernel():
         assert estimate.value == pytest.approx(asked.statistics[name].value, rel=1e-10), name
 
 
+@pytest.mark.ci
 def test_commands():
     def commands(t, y, r, members):
         return np.clip(heading(t, y, r, members), -9.0, 9.0)
@@ -215,6 +216,7 @@ def replacing(**functions):
     ]
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("on_disk", [False, True])
 def test_a_sweep_runs_each_function(tmp_path, on_disk):
     """Functions of one name: closures of a factory, and lambdas."""
@@ -229,6 +231,7 @@ def test_a_sweep_runs_each_function(tmp_path, on_disk):
     assert len({values.tobytes() for values in found.values()}) == 4
 
 
+@pytest.mark.ci
 def test_a_sweep_goes_on_with_what_is_the_same(tmp_path):
     """A second call runs no cell of the same functions, and every cell of another one."""
     known = {}
@@ -240,6 +243,7 @@ def test_a_sweep_goes_on_with_what_is_the_same(tmp_path):
         known = files
 
 
+@pytest.mark.ci
 def test_a_sweep_shares_nothing_in_doubt(tmp_path):
     lock = threading.Lock()
 

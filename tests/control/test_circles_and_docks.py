@@ -50,6 +50,7 @@ def array(numbers):
     }
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(("part", "twin"), [
     (lw.control.Waypoints(**CIRCLES, times=(0.05, 3.0, 9.0, 30.0), clockwise=False),
      waypoints.Waypoints(**array(CIRCLES | dict(times=(0.05, 3.0, 9.0, 30.0))), clockwise=False)),
@@ -113,6 +114,7 @@ def straight(x0, u0, current, pace, t1):
     return np.array(found)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("current", [0.0, 0.2])
 @pytest.mark.slow_but("0.2")
 def test_it_is_at_its_points_in_time(current):
@@ -157,6 +159,7 @@ def test_set_points_are_wanted_from_their_times_on():
     assert not r.samples["reference_velocity"].any()
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("clockwise", [True, False])
 @pytest.mark.slow_but("False")
 def test_a_circle_is_left_after_its_turns(clockwise):
@@ -291,6 +294,7 @@ def test_it_docks_or_goes_round(docked):
     assert went_round > 200
 
 
+@pytest.mark.ci
 def test_contacts_are_those_of_the_path(docked):
     values = {
         of: docked.statistics[f"each dock_contact {of}"].value[0, 0]

@@ -11,6 +11,8 @@ from lgvi_warp.reference.terms.thrusters import Thrusters
 from tests.laws.cases import PROPELLERS, THRUSTERS
 from tests.laws.cases_lift import FINS, arrays
 
+pytestmark = pytest.mark.ci
+
 CURRENT = np.array([0.3, -0.2, 0.1])
 # Mass off the origin, and axes of inertia that are not the body's: the kernel's axes and origins are others.
 MASS, CENTER = 20.0, np.array([0.05, 0.02, 0.04])

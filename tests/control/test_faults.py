@@ -117,6 +117,7 @@ def headings(rows):
     return np.arctan2(rows[..., 6], rows[..., 3])
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 @pytest.mark.parametrize("of", SENSED)
 def test_a_sensors_fault_is_that_of_an_own_loop(sensed, of):
@@ -277,6 +278,7 @@ def driven(request):
     return lag, run(one(loop(TWO, lag), parameters=PARAMETERS))
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_an_actuators_faults_are_those_of_an_own_loop(driven):
     """Commands, and where actuators are, of the laws' demands; the integral goes on through onsets and ends."""
@@ -295,6 +297,7 @@ def test_an_actuators_faults_are_those_of_an_own_loop(driven):
                 assert np.abs(result.actuator[1:, m, channel] - at[1:]).max() < 1e-12, (m, channel)
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_the_whole_loop_is_an_own_one(driven):
     """Headings of a loop that knows nothing of the result: exact between ticks, as commands are held, while it turns alone."""
@@ -363,6 +366,7 @@ def test_a_run_that_goes_on_in_the_middle_of_faults_has_the_same_bits(driven):
         assert np.array_equal(second.samples[name][1:], whole.samples[name][61:]), name
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_blocks_and_threads_change_no_bit(driven, tmp_path):
     lag, whole = driven

@@ -34,12 +34,14 @@ def ends(law):
     return BRIDGE.ends(lw.control.Callback(law, version=law.version), MEMBERS)
 
 
+@pytest.mark.ci
 def test_the_loop_is_that_of_the_law_in_the_kernel(law):
     """1,000 steps of round-off: the two evaluate one formula, the errors of the heading in another order."""
     fused = lw.control.HeadingPID(kp=3.0, ki=0.5, kd=2.0, anti_windup="none")
     assert np.abs(ends(law) - BRIDGE.ends(fused, MEMBERS)).max() < 1e-12
 
 
+@pytest.mark.ci
 def test_parameters_are_set(fmu):
     law = BRIDGE.FmuLaw(fmu, BRIDGE.PERIOD, BRIDGE.INPUTS, BRIDGE.OUTPUTS, {"kp": 2.0, "ki": 0.0})
     fused = lw.control.HeadingPID(kp=2.0, kd=2.0)
@@ -72,6 +74,7 @@ def test_a_file_that_is_no_fmu_is_told(tmp_path):
         other.write_text("no archive")
 
 
+@pytest.mark.ci
 def test_the_script_compares_both_laws(capsys):
     BRIDGE.main()
     first, second = capsys.readouterr().out.splitlines()

@@ -161,6 +161,7 @@ def of_fins(allocation, demands, speeds):
 LEAST = 0.4
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     "kind",
     [pytest.param(PseudoInverse, marks=pytest.mark.kernel), pytest.param(BoundedLeastSquares, marks=pytest.mark.slow)],
@@ -198,6 +199,7 @@ def test_fins_at_the_measured_speed_make_what_their_lift_at_it_can(kind):
             np.testing.assert_allclose(unmet[i], rest, atol=1e-10 * np.abs(demands).max())
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("flow_angle", [True, False])
 def test_fins_make_the_demanded_moment_ahead_and_astern(flow_angle):
     """The moment that acts on the vehicle, as the run accounts it, is the demanded one at either sign of the speed."""

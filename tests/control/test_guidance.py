@@ -35,6 +35,7 @@ def states(n):
     return position, np.tile(np.eye(3), (n, 1, 1)), np.tile((0.8, 0.1, 0.0), (n, 1)), np.zeros((n, 3))
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     ("method", "words"),
     [("los", {}), ("ilos", {"kappa": 0.4}), ("alos", {"gamma": 0.05}), ("los", {"at_end": "go_on"})],

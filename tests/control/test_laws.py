@@ -137,12 +137,14 @@ def check(law, steps, scene, run):
         assert error.max() < 1e-9
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("steps", [60, pytest.param(STEPS, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("law", NAMES)
 def test_a_law_is_its_twin(law, steps, scene, run):
     check(law, steps, scene, run)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("law", ["speed_pid", "pose_pid", "policy", "heading_smc"])
 def test_so_it_is_with_other_words(law, second):
     check(law, 60, *second)

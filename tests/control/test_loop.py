@@ -34,6 +34,7 @@ def scene(lag, delay=0.0, faults=(), **more):
     return lw.Scene(VEHICLE, lw.Environment(gravity=GRAVITY), terms, lw.Start(**STATE), loops, **more)
 
 
+@pytest.mark.ci
 @pytest.mark.slow_but("rk4-0.3-3")
 @pytest.mark.parametrize("delay", [0, 3, 7])
 @pytest.mark.parametrize("lag", [0.0, 0.3])

@@ -24,6 +24,7 @@ def turned():
     return {name: angles[name] - angles["none"] for name in ("rudder", "planes")}
 
 
+@pytest.mark.ci
 def test_rudder_and_planes_turn_as_the_table_says(turned):
     assert turned["rudder"][0] < -0.01  # to port
     assert turned["planes"][1] < -0.01  # bow down

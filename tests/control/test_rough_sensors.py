@@ -45,6 +45,7 @@ def within(count, n, chance):
     return abs(count - n * chance) < ERRORS * np.sqrt(n * chance * (1.0 - chance))
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_outliers_are_as_often_and_as_large_as_they_say(readings):
     log = readings[..., 12:15].reshape(-1, 3)

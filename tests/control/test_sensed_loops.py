@@ -58,6 +58,7 @@ def twin(m):
     return twin_run(replace(body, member=m), loop, "psi_s", H, STEPS)[0]
 
 
+@pytest.mark.ci
 @pytest.mark.slow_for("float32")
 @pytest.mark.parametrize("dtype", ["float64", "float32"])
 def test_the_loop_is_the_twins(dtype):

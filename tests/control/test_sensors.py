@@ -172,6 +172,7 @@ def members_of(case):
     return one(chain(case), parameters=VARIED[case])
 
 
+@pytest.mark.ci
 @pytest.mark.slow_for("all-float32", "plain-float32", "reckoned-float32")
 @pytest.mark.parametrize("dtype", ["float64", "float32"])
 @pytest.mark.parametrize("case", list(SENSORS))
@@ -182,6 +183,7 @@ def test_what_is_measured_is_the_twins(case, dtype):
     assert np.abs(seen - wanted).max() < 10 * TICKS * 40 * EPS[dtype]
 
 
+@pytest.mark.ci
 def test_the_first_reading_stands_until_another_arrives():
     """Lost from the start, late by more than the run, and always too deep: the reading of before the run is all there is."""
     lost = [
@@ -216,6 +218,7 @@ def readings():
     return measured(one(chain("all"), parameters=varied), truth, H)
 
 
+@pytest.mark.ci
 def test_the_variance_of_a_walk_grows_with_time(readings):
     walk = readings[..., 18:21]
     for k in (1, 20, 59):
@@ -247,6 +250,7 @@ def test_the_share_of_lost_readings_is_the_dropout(readings):
     assert abs(again - 0.09) < ERRORS * np.sqrt(0.09 * 0.91 / count) * np.sqrt(2.0)
 
 
+@pytest.mark.ci
 def test_numbers_that_are_the_same_for_all_designs():
     truth = motion()
     base = measured(members_of("all"), truth, H)
@@ -261,6 +265,7 @@ def test_numbers_that_are_the_same_for_all_designs():
     assert np.array_equal(few, base[:, :3])
 
 
+@pytest.mark.ci
 def test_each_sensor_and_seed_has_numbers_of_its_own():
     truth = motion(members=1)
     base = chain("plain").controller
@@ -276,6 +281,7 @@ def test_each_sensor_and_seed_has_numbers_of_its_own():
         assert all(abs(np.corrcoef(a, b)[0, 1]) < ERRORS / np.sqrt(TICKS) for b in errors[:i])
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("extreme", [np.nan, 1e200])
 def test_one_members_extreme_changes_no_other_bit(extreme):
     truth = motion()
@@ -306,6 +312,7 @@ def test_what_no_member_has_is_no_code():
     assert modules([lw.control.Sensor(of="depth")], varied)[0] is built_in("laws.control", "sensor:depth,bias,dropout")
 
 
+@pytest.mark.ci
 def test_a_filters_step_response():
     # A step of 1 at tick 1: after n periods 1 - exp(-n T / tau), exactly, for readings that are held.
     truth = np.zeros((TICKS, 1, 21))

@@ -121,6 +121,7 @@ class Forgetful(CarelessLaw):
         return lw.laws.Packed({"level": numbers["level"][:1]}, memory=np.zeros((1, 1)))
 
 
+@pytest.mark.ci
 def test_what_is_wrong_is_said():
     wide = scenes.loads(SCENE.replace("bang", "heading_pid").replace("level = 3.0", "kp = 1.0").split("[ensemble]")[0]
                         .replace("depth = 1.0", "heading = 1.0"))  # fmt: skip
@@ -139,6 +140,7 @@ def test_what_is_wrong_is_said():
 GAINS = dict(kp=1.0, ki=0.2, kd=0.3, integral_limit=0.05)
 
 
+@pytest.mark.ci
 def test_a_twin_agrees_or_is_said_to_differ():
     part = lw.control.HeadingPID(**GAINS)
     assert lw.laws.check_controller(part, twin=heading_pid.HeadingPID(**GAINS)).ok
@@ -197,6 +199,7 @@ PARTS = {
 }  # fmt: skip
 
 
+@pytest.mark.ci
 @pytest.mark.slow_but("place")
 @pytest.mark.parametrize("name", PARTS)
 def test_the_parts_of_the_package_are_right(name):
@@ -206,6 +209,7 @@ def test_the_parts_of_the_package_are_right(name):
     assert not any("note: changes nothing" in check.text for check in report.checks), str(report)
 
 
+@pytest.mark.ci
 @pytest.mark.slow_but("2")
 @pytest.mark.parametrize("channel", [0, 1, 2])
 def test_a_fault_of_a_sensor_is_its_twin(channel):

@@ -31,6 +31,7 @@ def run(tmp_path_factory):
     return python
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_its_tests_pass(run):
     done = run("-m", "pytest", "-q", "-p", "no:cacheprovider", "--rootdir", str(TEMPLATE), str(TEMPLATE / "tests"))

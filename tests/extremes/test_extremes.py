@@ -9,6 +9,8 @@ from lgvi_warp.common.status import Status
 from tests.extremes import cases
 from tests.extremes.cases import DTYPES, GROUPS, METHODS, OK
 
+pytestmark = pytest.mark.ci
+
 # A bound above this says nothing; of float32, whose error is 2^29 times as large, only the case's own growth decides.
 TELLING = 1e-3
 

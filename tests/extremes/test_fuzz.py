@@ -13,6 +13,7 @@ from tests.extremes.fuzz import CONTROLLED, GOOD, outcomes
 SLOW = pytest.mark.slow
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(("kind", "cases", "kernels"), [
     ("files", 300, 0), ("set", 50, 0), ("controllers", 150, 0), pytest.param("files", 10_000, 4, marks=SLOW),
     pytest.param("set", 4000, 4, marks=SLOW), pytest.param("controllers", 5000, 4, marks=SLOW),

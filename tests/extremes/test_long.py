@@ -24,6 +24,7 @@ def rising(values, unit):
     return float((np.diff(values, axis=0) / (unit * values[:-1] + 1e-300)).max())
 
 
+@pytest.mark.ci
 @pytest.mark.slow_but("psi_s-float32")
 @pytest.mark.parametrize("dtype", DTYPES)
 @pytest.mark.parametrize("method", ["psi_s", "psi_x"])
@@ -73,6 +74,7 @@ def test_energy_never_grows_by_a_drag_matrix(dtype):
     assert rising(np.maximum(energy, 1e-30 * energy[0]), UNIT[dtype]) < 400.0
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("kappa", KAPPAS)
 def test_a_linear_drag_matrix_step(kappa):
     # Two stages with gamma = 1 - 1/sqrt(2) on v' = -z v / h: v <- v (1 + (2 gamma - 1) z) / (1 + gamma z)^2.
@@ -105,6 +107,7 @@ def fall(case, h, steps):
     return float(w), float(b)
 
 
+@pytest.mark.ci
 @pytest.mark.slow_for("float64*")
 @pytest.mark.parametrize("dtype", ["float64", "float32", pytest.param("float32_compensated", marks=SLOW)])
 def test_falling_and_rising_for_a_day(dtype):

@@ -79,6 +79,7 @@ SETTINGS = [
 ]  # fmt: skip
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("dtype", ["float64", pytest.param("float32", marks=SLOW)])
 @pytest.mark.parametrize(
     ("method", "scene"), [pytest.param(m, s, marks=k, id=f"{m}-{'-'.join(s) or 'free'}") for m, s, k in SETTINGS]

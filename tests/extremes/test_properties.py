@@ -60,6 +60,7 @@ def drawn(u):
     return Group("free", H, STEPS, tuple(free(row) for row in u))
 
 
+@pytest.mark.ci
 @EXAMPLES
 @pytest.mark.parametrize("dtype", ["float64", "float32"])
 @pytest.mark.parametrize("method", ["psi_s", "psi_x"])
@@ -144,6 +145,7 @@ def energy(case, p, pi):
     return 0.5 * (p @ (p / case.M) + pi @ (pi / case.J))
 
 
+@pytest.mark.ci
 @EXAMPLES
 def test_what_the_kernel_flags_at_once_has_no_sure_solution(examples):
     # One step: the reference's solver of (24), by Newton on the exponential map, against the kernel's on the first solve.

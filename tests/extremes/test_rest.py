@@ -26,6 +26,7 @@ def lost_products():
     return sum(int((x * x == 0.0).sum()) for x in (np.full(64, 1e-20, np.float32), np.full(64, 1e-155)))
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     "dtype", ["float32", *(pytest.param(name, marks=pytest.mark.slow) for name in ("float64", "float32_compensated"))]
 )

@@ -38,6 +38,7 @@ def test_the_main_names_have_examples():
     assert set(EXAMPLES) >= LONG | main
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=[pytest.mark.slow] if name in LONG else []) for name in EXAMPLES]
 )

@@ -6,6 +6,7 @@ import runpy
 import tomllib
 
 import matplotlib
+import pytest
 
 import lgvi_warp as lw
 from tests.conftest import ROOT
@@ -14,6 +15,7 @@ from tests.support.pages import blocks, snippets
 matplotlib.use("Agg")
 
 
+@pytest.mark.ci
 def test_readme(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     _, code, output = snippets("README.md", "python")[0]

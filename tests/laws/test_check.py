@@ -32,6 +32,7 @@ def names_of_failed(report):
 EACH = pytest.mark.parametrize("term", [term for _, term in BUILT_IN], ids=[name for name, _ in BUILT_IN])
 
 
+@pytest.mark.ci
 @EACH
 def test_a_built_in_law_is_right(term):
     report = lw.laws.check_law(term)
@@ -48,6 +49,7 @@ def test_a_scene_file_holds_it(term):
         np.testing.assert_array_equal(getattr(again, key), value, err_msg=key)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     "term",
     [lw.terms.Weight(), lw.terms.Restoring(), lw.events.Surface(), lw.events.StopTime(at=3.0)],
@@ -60,6 +62,7 @@ def test_what_follows_from_the_vehicle_and_events_are_right(term):
     assert lw.laws.check_law(term, scene=other, samples=5, seed=7).ok
 
 
+@pytest.mark.ci
 def test_a_law_may_remember_a_single_number():
     wing = dict(
         position=[[-0.5, 0.0, 0.0]], chord=[[1.0, 0.0, 0.0]], normal=[[0.0, 0.0, -1.0]], area=0.01, lift_slope=3.0
@@ -70,11 +73,13 @@ def test_a_law_may_remember_a_single_number():
     assert lw.laws.check_law(fin).ok
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("step", [1e-4, 1e-6])
 def test_the_tolerance_follows_the_step(step):
     assert lw.laws.check_law(CASES["tether"].terms[0], step=step, samples=256).ok
 
 
+@pytest.mark.ci
 def test_a_report_is_a_table():
     report = lw.laws.check_law(CASES["tether"].terms[0])
     lines = str(report).splitlines()
@@ -83,6 +88,7 @@ def test_a_report_is_a_table():
     assert "law: torque = -dU/dR" in str(report)
 
 
+@pytest.mark.ci
 def test_a_law_that_sleeps_is_noted():
     asleep = lw.laws.check_law(CASES["slack tether"].terms[0])
     assert asleep.ok
@@ -134,6 +140,7 @@ class Lifting(Creating):
     dissipative = False
 
 
+@pytest.mark.ci
 def test_damping_that_creates_energy():
     # Positive on the diagonal, and yet less than nothing along (1, -1, 0, 0, 0, 0).
     linear = np.eye(6)
@@ -189,6 +196,7 @@ def with_role(role, function, strength=0.3):
     return with_device(type("Device", (), {"params": staticmethod(stirred_params), role: function}), strength)
 
 
+@pytest.mark.ci
 def test_a_flow_whose_gradient_is_wrong():
     report = lw.laws.check_law(Stirred(strength=0.3))
     wrong = {"rate = du/dt", "by_depth = du/db3", "FLOW", "water()", "blind to time"}
@@ -267,6 +275,7 @@ def heading_law(w: Any, view: Any, p: Any):
     return w
 
 
+@pytest.mark.ci
 def test_damping_along_one_axis_is_right():
     report = lw.laws.check_law(with_role("damping", resisting_damping))
     assert "finite at rest, along axes" not in names_of_failed(report)
@@ -364,6 +373,7 @@ WRONG = {
 }  # fmt: skip
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(("term", "failed", "words"), [(row[0], row[1], row[2:]) for row in WRONG.values()], ids=WRONG)
 def test_what_is_wrong_is_said(term, failed, words):
     report = lw.laws.check_law(term)
@@ -410,6 +420,7 @@ def test_what_is_no_term():
         lw.laws.check_law(lw.terms.Tether)
 
 
+@pytest.mark.ci
 def test_a_second_check_builds_no_kernel():
     from lgvi_kernels.advance.examine import make_examine
 

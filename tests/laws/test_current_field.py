@@ -70,6 +70,7 @@ def test_a_trilinear_current_in_time_is_exact():
 ORDERS = {"phi": 1, "psi": 2, "psi_s": 2, "psi_1": 2, "psi_x": 2, "psi_x8": 2, "psi_w": 2, "rk4": 4, "rk5": 5}
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     "method", [pytest.param(name, marks=() if name in ("psi_s", "rk4") else pytest.mark.slow) for name in ORDERS]
 )
@@ -137,6 +138,7 @@ def test_a_member_of_a_scenario_that_is_not_there_is_refused():
         lw.Ensemble(scene(field), 2, 0, {"current_field.scenario": lw.distributions.Choice([2.0])})
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("dtype", ["float64", "float32"])
 @pytest.mark.parametrize("levels", [1, 4])
 def test_a_large_grid_gives_what_its_part_gives(dtype, levels):
@@ -163,6 +165,7 @@ def test_a_large_grid_gives_what_its_part_gives(dtype, levels):
     np.testing.assert_allclose(ends[1].position[-1], ends[0].position[-1], rtol=0.0, atol=30.0 * tolerance)
 
 
+@pytest.mark.ci
 def test_the_nodes_of_a_field_are_written_once_for_all_calls(monkeypatch):
     rng = np.random.default_rng(5)
     field = lw.terms.CurrentField(velocities=0.1 * rng.normal(size=(60, 60, 20, 3)), spacing=[1.0, 1.0, 1.0])
@@ -208,6 +211,7 @@ def hills(depth):
     )
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("method", ["psi_s", "rk4", "psi_x"])
 @pytest.mark.parametrize("h", [0.5, 30.0])
 def test_a_member_that_leaves_a_field_and_meets_the_floor_stops_at_what_comes_first(method, h):
@@ -234,6 +238,7 @@ def test_a_member_that_leaves_a_field_and_meets_the_floor_stops_at_what_comes_fi
     np.testing.assert_allclose(result.position[-1], start + first[:, None] * water, rtol=1e-9)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("dtype", ["float64", "float32"])
 def test_a_run_goes_on_in_a_field_with_a_single_scenario(dtype):
     # One member, one scenario, one fleet of many: each goes on as if it had not been cut.

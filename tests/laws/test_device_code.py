@@ -21,6 +21,8 @@ from tests.laws.case import Case
 from tests.laws.cases import CASES, PROPELLERS, TABLE_OF_THRUST, THRUSTERS
 from tests.laws.test_parity import GRAVITY, STATE, VEHICLE
 
+pytestmark = pytest.mark.ci
+
 # Long enough for several turns of a command.
 FOLLOWED = 0.7
 PACKETS, SEED = 16, 12 + (34 << 32)

@@ -52,6 +52,7 @@ ACTUATORS = {
 }  # fmt: skip
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("name", ACTUATORS)
 def test_an_actuator_does_what_its_twin_does(name):
     term, law = ACTUATORS[name]

@@ -61,6 +61,7 @@ def test_held_commands_and_a_hotel_load_use_power_times_time(method):
     assert used(method=method) == pytest.approx(2.0 * HOTEL, rel=1e-13)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("method", ["psi_s", "rk4"])
 def test_a_linear_schedule_of_power_is_integrated_exactly(method):
     # Each within one segment of the table, so that the power goes straight: the trapezoid of its ends.
@@ -73,6 +74,7 @@ def test_a_linear_schedule_of_power_is_integrated_exactly(method):
     assert used(turning, method=method) == pytest.approx(2.0 * HOTEL + path, rel=1e-13)
 
 
+@pytest.mark.ci
 def test_a_dead_band_a_limit_and_the_ends_of_the_table_count():
     # Commands beyond the limit of 0.7; within the band the table's 0; the band is taken off before the look-up.
     inside = thrusters(command=[0.9, 0.1], limit=0.7, dead_band=0.2)
@@ -147,12 +149,14 @@ def test_power_that_falls_with_the_speed_is_that_of_the_recorded_motion():
     assert coarse.energy_used[-1, 0] == pytest.approx(result.energy_used[-1, 0], rel=1e-4)
 
 
+@pytest.mark.ci
 def test_a_propeller_that_the_water_drives_gives_nothing_back():
     law = lw.terms.Thrusters(position=[[-0.5, 0.0, 0.0]], direction=[[1.0, 0.0, 0.0]], coefficient=0.0, command=[0.1],
                              torque_coefficient=0.5, torque_loss=0.2, shaft_speed=12.0)  # fmt: skip
     assert used(law, t1=0.5) == pytest.approx(0.5 * HOTEL, rel=1e-13)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("method", ["psi_s", "rk4"])
 @pytest.mark.parametrize(
     "name", [pytest.param("propellers, shaft"), pytest.param("lagging, watts", marks=pytest.mark.slow)]
@@ -181,6 +185,7 @@ def test_the_motion_keeps_its_bits_beside_an_account():
     np.testing.assert_array_equal(with_account.position, without.position)
 
 
+@pytest.mark.ci
 def test_the_law_of_powered_thrusters_passes_its_check():
     for term in (ACCOUNT, replace(POWERED["propellers, shaft"].terms[0])):
         report = lw.laws.check_law(term)
@@ -212,6 +217,7 @@ class Pump(lw.laws.Term):
     outlet: Any = lw.laws.number((3,), "m", (0.0, 0.0, 0.0), axes="point")
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("method", ["psi_s", "rk4"])
 def test_a_law_of_ones_own_may_take_power(method):
     pump = Pump(rate=3.0, outlet=(0.2, 0.0, 0.1))

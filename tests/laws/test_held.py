@@ -62,6 +62,7 @@ def test_fins_that_are_held_remember_nothing(more):
     assert (choice.memory, choice.timed) == (False, False)
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 @pytest.mark.slow_but("rk4-float64-square")
 @pytest.mark.parametrize("curve", CURVES)

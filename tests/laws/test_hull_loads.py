@@ -116,6 +116,7 @@ def moment_of(scene, **state):
     return J * accelerations(one(scene, **state), "rk8", 2e-3)[1][0]
 
 
+@pytest.mark.ci
 def test_a_growing_strain_turns_a_spheroid_as_its_pressure_does():
     # k = rho V (a^2 - c^2) / 5 + J_A (a^2 + c^2) / (a^2 - c^2) = 8.20 N m s^2 in water of 1025 kg/m3; by pressure 8.195.
     hull = Spheroid(0.8, 0.1)
@@ -219,6 +220,7 @@ def test_the_moment_is_newmans_in_a_wave_as_long_as_the_hull():
     assert abs(weight @ (-x * (displaced + a)) * rise[len(x) // 4] / moment - 1.0) > 0.1
 
 
+@pytest.mark.ci
 def test_drag_is_that_of_the_flow_at_each_strip():
     # Water that rises with x across a bar at rest: its moment is rho / 2 Cd D g^2 times the integral of |x|^3.
     length, slope, Cd = 1.6, 0.7, 1.1

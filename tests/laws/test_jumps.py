@@ -25,6 +25,7 @@ def exact(t):
     return x
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("method", ["rk4", "rk8", "rkw3", "psi_x", "psi_s"])
 @pytest.mark.parametrize("h", [0.1, 0.02])
 def test_jumps_at_whole_steps_cost_no_order(method, h):

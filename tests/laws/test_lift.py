@@ -47,6 +47,7 @@ UNFELT = (
 )
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(("angle", "incidence"), [(0.0, 1e-3), (1e-3, 0.0), (2e-3, -1e-3)])
 def test_a_small_angle_is_a_thin_wing(angle, incidence):
     # Lift rho/2 A V^2 slope (deflection + incidence) along the normal, here up: to 2/3 angle^2 = 1e-6, and the step's
@@ -58,6 +59,7 @@ def test_a_small_angle_is_a_thin_wing(angle, incidence):
     assert found[2] - 2.0 * incidence == pytest.approx(-lift * 1e-3 / 1000.0, rel=1e-4)
 
 
+@pytest.mark.ci
 def test_a_fin_across_the_flow_stops_as_a_plate():
     # m v' = -rho/2 A (drag + drag_normal) v^2: v = v0 / (1 + k v0 t); order 2 in h k v0 = 0.01.
     fins = terms.Fins(**(WING | {"area": 1.0}), drag=0.1, drag_normal=1.1)
@@ -116,6 +118,7 @@ def deflections(fins, h, steps):
     return np.array(found)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(("command", "reached"), [(0.2, 0.2), (-0.9, -0.35)])
 def test_the_rate_limit_is_exact(command, reached):
     # The command jumps at t = 0.1: the deflection follows at 0.5 rad/s, to the command or its limit and not beyond.

@@ -46,6 +46,7 @@ def run(h, t1=END, method="psi_x", every=None, **named):
     return lw.solve(fleet(**named), method, h=h, t1=t1, save=every and lw.SaveAt(every=every))
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("repeat", REPEATS)
 def test_white_noise_on_linear_drag_is_its_own_recursion(repeat):
     # A step of psi_x: half the impulse, the implicit step V (Alexander 1977: its factor of y' = -g y), half the impulse.
@@ -61,6 +62,7 @@ def test_white_noise_on_linear_drag_is_its_own_recursion(repeat):
     np.testing.assert_allclose(result.velocity[-1], v, rtol=0.0, atol=1e-13)
 
 
+@pytest.mark.ci
 def test_the_current_that_wanders_is_the_same_for_every_step():
     # A neutral body moves with the water: its velocity less that in still water is u, whose updates are exact.
     paths = []
@@ -75,6 +77,7 @@ def test_the_current_that_wanders_is_the_same_for_every_step():
         np.testing.assert_allclose(path, paths[0], rtol=0.0, atol=1e-13)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("repeat", REPEATS)
 def test_mean_and_variance_are_those_of_the_exact_solution(repeat):
     # E v = v0 e^(-g t), Var v = S^2 / m^2 (1 - e^(-2 g t)) / (2 g); of the step: (g h)^2 / 6 of them, less than 2e-3.
@@ -85,6 +88,7 @@ def test_mean_and_variance_are_those_of_the_exact_solution(repeat):
     assert np.all(np.abs(v.var(axis=0) / variance - 1.0) < ERRORS * np.sqrt(2.0 / MEMBERS) + 2e-3)
 
 
+@pytest.mark.ci
 def test_halving_the_step_changes_paths_with_the_strong_order():
     # What a step leaves out of a path is the bridge between its ends: independent from step to step, of variance h^3 each.
     results = {repeat: run(repeat * GRID) for repeat in REPEATS}
@@ -97,6 +101,7 @@ def test_halving_the_step_changes_paths_with_the_strong_order():
         )
 
 
+@pytest.mark.ci
 def test_members_keep_their_path_in_a_subset_and_in_a_store(tmp_path):
     h, whole = 4 * GRID, run(4 * GRID, members=300)
     subset = lw.solve(fleet(members=300).subset([5, 299, 6]), "psi_x", h=h, t1=END)
@@ -203,6 +208,7 @@ class Gust(lw.laws.NoisyTerm):
     strength: Any = lw.laws.number((3,), "N s^1/2", axes="vector")
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("noise_step", [None, KICK, KICK / 5.0])
 def test_a_users_law_asks_for_the_draws_of_its_step(noise_step):
     gust = Gust(strength=S, noise_step=noise_step)

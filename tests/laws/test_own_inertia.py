@@ -67,6 +67,7 @@ def scene(*terms, vehicle=VEHICLE):
     return lw.Scene(vehicle, lw.Environment(gravity=0.0), terms=list(terms))
 
 
+@pytest.mark.ci
 def test_they_are_right():
     for law in (Intake(rate=0.3, tank=[0.2, -0.1, 0.4]), Wheel(spin=[1.0, 2.0, -0.5])):
         report = lw.laws.check_law(law)
@@ -77,6 +78,7 @@ def test_they_are_right():
     assert any(check.name == "carried_momentum: any axes" for check in report.checks)
 
 
+@pytest.mark.ci
 def test_water_that_is_taken_in():
     # (M + q t) v = M v0 in a tank at the center, and the rates as before: v and the way by hand.
     fleet = one(scene(Intake(rate=0.5)), nu=(1.5, 0.0, 0.0))

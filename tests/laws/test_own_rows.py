@@ -265,6 +265,7 @@ OTHERS = [(40, 9, dtype, False, width) for dtype in ("float64", "float32") for w
 OTHERS += [(40, 9, "float32", True, None), (40, 5000, "float32", False, 1), (40, 5000, "float64", False, 32)]
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(("members", "rows", "dtype", "varied", "width"), [
     (1, 9, "float64", False, None), (40, 9, "float64", True, None), (40, 5000, "float64", False, None),
     (40, 5000, "float32", False, None), *(pytest.param(*other, marks=pytest.mark.slow) for other in OTHERS),

@@ -73,6 +73,7 @@ def test_all_together_has_every_type():
 
 
 # Drag along the axes, which has no matrix beside it, and one law of each type at once.
+@pytest.mark.ci
 @pytest.mark.slow_but("quadratic drag", "drag", "all together")
 @pytest.mark.parametrize("name", CASES)
 def test_one_step(name):
@@ -80,6 +81,7 @@ def test_one_step(name):
     assert difference(kernel, twin) < 1e-13
 
 
+@pytest.mark.ci
 @pytest.mark.slow_but("quadratic drag", "drag", "all together")
 @pytest.mark.parametrize("name", CASES)
 def test_a_hundred_steps(name):
@@ -88,6 +90,7 @@ def test_a_hundred_steps(name):
     assert difference(kernel, twin) < 2e-12
 
 
+@pytest.mark.ci
 def test_drag_along_axes_that_are_not_principal():
     # Strong in yaw and sway: each axis changes the velocities along all others.
     strong = case(lw.terms.Drag, linear=(8.0, 60.0, 5.0, 0.7, 0.4, 9.0), quadratic=(10.0, 30.0, 90.0, 1.0, 6.0, 3.0))
@@ -106,6 +109,7 @@ FIXED = ("scenario", "command", "polynomial", "polynomial_astern", "table_comman
 EXACT = ("current harmonics", "waves", "Gauss-Markov current", "wrench noise", "stratification")
 
 
+@pytest.mark.ci
 @pytest.mark.slow_but("quadratic drag")
 @pytest.mark.parametrize("name", [name for name in CASES if name != "control fins"])
 def test_every_number_may_vary(name):
@@ -137,6 +141,7 @@ FORCED_CASES = {"several": together("drag matrix", "current profile", "wrench sc
 
 
 # psi holds both of its halves, phi and phi_adjoint.
+@pytest.mark.ci
 @pytest.mark.slow_but("several-psi")
 @pytest.mark.parametrize("method", ["psi", "phi", "phi_adjoint"])
 @pytest.mark.parametrize("name", FORCED_CASES)
@@ -177,6 +182,7 @@ SMOOTH = {name: case.terms for name, case in CASES.items() if case.smooth} | {
 }
 
 
+@pytest.mark.ci
 @pytest.mark.slow_but("drag", "all together")
 @pytest.mark.parametrize("name", SMOOTH)
 def test_order_two(name):
@@ -194,6 +200,7 @@ def test_order_two(name):
 SINGLE = {"several": together("drag matrix", "current profile", "wrench", "fins")} | CASES
 
 
+@pytest.mark.ci
 @pytest.mark.slow_but("several")
 @pytest.mark.parametrize("name", SINGLE)
 def test_float32(name):

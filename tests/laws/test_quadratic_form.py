@@ -36,6 +36,7 @@ def random_form(rng, count):
     return names, values, tables
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow), pytest.param(3, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("axes", ["any", "others", "the user's"])
 def test_random_forms_are_sums_over_tables(seed, axes):
@@ -60,6 +61,7 @@ def in_water(*terms, vehicle=BODY):
     return lw.Scene(vehicle, lw.Environment(GRAVITY), terms=list(terms))
 
 
+@pytest.mark.ci
 @pytest.mark.slow_but("X_uu-psi_s-2.0", "X_u|vw|-rk4-4.0")
 @pytest.mark.parametrize(("method", "order"), [("psi_s", 2.0), ("rk4", 4.0)])
 @pytest.mark.parametrize("name", ["X_uu", "X_u|u|", "X_u|vw|"])
@@ -79,6 +81,7 @@ def test_a_run_straight_ahead_slows_down_as_its_closed_form(name, method, order)
     assert errors[-1] < {"psi_s": 2e-3, "rk4": 1e-6}[method]
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("method", [pytest.param("psi_x", marks=pytest.mark.slow), "rk4"])
 def test_remus_by_its_names_is_remus_by_its_matrices(method):
     scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.1, -0.1], "angular_velocity": [0.1, 0.1, -0.2]})
@@ -165,6 +168,7 @@ def test_a_published_vehicle_accelerates_as_its_equations_say():
         np.testing.assert_allclose(rate, expected[3:], atol=1e-8)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(("method", "order"), [pytest.param("psi_x", 2.0, marks=pytest.mark.slow), ("rk4", 4.0)])
 def test_orders_of_a_published_vehicle(method, order):
     fleet = one(nps_scene(), nu=(2.0, 0.2, -0.1), Om=(0.1, 0.1, -0.2))
@@ -218,11 +222,13 @@ def test_a_rescue_vehicle_swings_as_its_linear_equations_say():
     assert np.abs(expected).max() > 0.1 * np.abs(begun).max()
 
 
+@pytest.mark.ci
 def test_no_published_vehicle_is_told_to_drive_itself():
     for scene in (nps_scene(), dsrv()[0]):
         assert not [text for text in lw.solve(scene, "rk4", h=0.1, t1=0.1).messages if "quadratic_form" in text]
 
 
+@pytest.mark.ci
 def test_members_with_entries_of_their_own():
     form = lw.terms.QuadraticForm.of({"X_u|u|": -3.0, "Y_uv": -20.0, "N_uv": 5.0, "N_r|r|": -10.0})
     wake = lw.terms.QuadraticForm(name="wake", products=["Z_w|vw|", "M_|w|q"], values=[-50.0, -20.0])

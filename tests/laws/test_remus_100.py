@@ -127,6 +127,7 @@ def test_speed_from_rest():
     assert slope(steps, errors) == pytest.approx(2.0, abs=0.1)
 
 
+@pytest.mark.ci
 def test_steady_speed():
     # After 160 s the transient is 2 exp(-2 t / tau) = 2e-11. What is left is the shift of the balance by a step in which
     # thrust and drag act in turn: (rate h)^2 / 12 or less, the rate 2 k u / m = 0.16 1/s.

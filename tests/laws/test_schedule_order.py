@@ -89,6 +89,7 @@ def errors(name, method, h):
 METHODS = ("psi_s", "psi_x", "psi_1", "psi", "psi_x8", "psi_w", "rk4")
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 @pytest.mark.slow_but("psi_s-ballast", "psi_x-thrusters")
 @pytest.mark.parametrize("name", ACTUATORS)
@@ -113,6 +114,7 @@ UNREACHED = {
 }
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 @pytest.mark.slow_but("psi_s-ballast-*", "psi_x-flow_angle-rate")
 @pytest.mark.parametrize("way", UNREACHED)
@@ -142,6 +144,7 @@ TURNING = {
 }
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 @pytest.mark.slow_but("psi_x-flow_angle")
 @pytest.mark.parametrize("name", TURNING)
@@ -157,6 +160,7 @@ def test_what_turns_the_vehicle_keeps_the_order(method, name):
     assert slope(steps, [np.abs(end(method, h) - truth).max() for h in steps]) > 1.9
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 @pytest.mark.slow_for("psi_x")
 @pytest.mark.parametrize("method", ["psi_s", "psi_x"])

@@ -68,6 +68,7 @@ OTHERS = {
 }
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 @pytest.mark.slow_but("rk4-*")
 @pytest.mark.parametrize("tau", [0.2, 0.0])

@@ -52,6 +52,7 @@ def scene(k, *water):
     return lw.Scene(body, lw.Environment(GRAVITY), terms=[GroundFriction(coefficient=k), *water])
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(("method", "h", "allowed"), [("rk8", 0.05, 1e-12), ("psi_s", 0.01, 2e-5), ("psi", 0.01, 2e-5)])
 @pytest.mark.parametrize(
     "water",
@@ -75,6 +76,7 @@ def test_friction_however_strong_is_stable():
     assert np.abs(b).max() < 0.2
 
 
+@pytest.mark.ci
 def test_it_is_checked_like_any_law():
     report = lw.laws.check_law(GroundFriction(coefficient=30.0))
     assert report.ok, report

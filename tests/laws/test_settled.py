@@ -41,6 +41,7 @@ KINDS = {
 }
 
 
+@pytest.mark.ci
 @pytest.mark.slow_but("rk4-fast fins", "rk4-prompt thrusters")
 @pytest.mark.parametrize("name", KINDS)
 @pytest.mark.parametrize("method", METHODS[:3])
@@ -60,6 +61,7 @@ def test_no_bit_depends_on_where_launches_end(method, name):
         np.testing.assert_array_equal(a, b)
 
 
+@pytest.mark.ci
 def test_code_without_zeros_is_that_of_members_with_others():
     # Entries of the second member's thruster and fin are zero in the first, which alone has code of its own.
     thrusters, fins = ALONE["prompt thrusters"].terms[0], FAST.terms[0]
@@ -87,6 +89,7 @@ def test_commands_that_nothing_follows_behind_are_settled_once_a_step(law_of):
     assert plays(law_of(("driven",)), ANEW) is not None
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("delay", [0.0, 0.3])
 @pytest.mark.parametrize("method", ["rk4", "rk8"])
 def test_commands_of_a_tick_act_as_held_ones_do(method, delay):

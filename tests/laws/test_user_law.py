@@ -45,6 +45,7 @@ def solve(laws, h=0.05, t1=5.0, vehicle=own_law.vehicle, **named):
     return lw.solve(one(scene, **START), "psi_s", h=h, t1=t1, **named)
 
 
+@pytest.mark.ci
 def test_each_law_is_right():
     near = lw.Scene(own_law.vehicle, start=lw.Start(position=[1.0, 1.0, 3.0]))
     assert lw.laws.check_law(own_law.Dock(**DOCK), scene=near).ok
@@ -63,6 +64,7 @@ def test_the_dock_draws_and_the_mud_brakes():
     np.testing.assert_allclose(nothing.position, free.position, atol=1e-12)
 
 
+@pytest.mark.ci
 def test_the_energy_is_kept_to_second_order():
     drifts = []
     for h in STEPS:
@@ -78,6 +80,7 @@ def test_mud_only_takes_energy():
     assert np.all(np.diff(energy) < 0.0)
 
 
+@pytest.mark.ci
 def test_axes_do_not_matter():
     # The same vehicle in turned body axes: the kernel works in its principal axes, and packed() must turn the nose.
     v = own_law.vehicle
@@ -96,6 +99,7 @@ def test_axes_do_not_matter():
     np.testing.assert_allclose(runs[1].attitude, runs[0].attitude @ TURN, rtol=0.0, atol=1e-10)
 
 
+@pytest.mark.ci
 def test_numbers_vary_by_member():
     fleet = own_law.fleet([own_law.dock, own_law.mud], members=20)
     alone = fleet.subset([7])
@@ -120,6 +124,7 @@ center_of_buoyancy = [0.0, 0.0, -0.02]
 """
 
 
+@pytest.mark.ci
 def test_a_scene_file_may_name_them():
     scene = scenes.loads(SCENE)
     assert [type(term) for term in scene.terms] == [own_law.Dock, own_law.Mud]
@@ -146,6 +151,7 @@ def test_a_type_is_taken_once(monkeypatch):
             lw.laws.register(kind)
 
 
+@pytest.mark.ci
 def test_the_law_on_the_page_is_right(tmp_path):
     lines = (ROOT / "docs" / "develop" / "add_a_force.md").read_text().split("## Nine roles")[0].splitlines()
     code = "\n".join(line[4:] for line in lines if line.startswith("    ") or not line)

@@ -97,6 +97,7 @@ def test_the_host_knows_the_same_waves():
     np.testing.assert_allclose(got, expected, rtol=0.0, atol=1e-14)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("amplitude", [0.05, 0.1])
 def test_drift_and_orbit_of_a_particle(amplitude):
     # A small neutrally buoyant sphere at rest in the water is a particle of it (Faltinsen 1990; Stokes 1847):
@@ -152,6 +153,7 @@ def ensemble(*inputs, members=MEMBERS, seed=7, **named):
     return lw.Ensemble(scene(*inputs, **named), members, seed)
 
 
+@pytest.mark.ci
 def test_statistics_of_the_wandering_current():
     # Started at 0, after t: E u_t u_(t+s) = sd^2 e^(-s/tau) (1 - e^(-2t/tau)), whatever the step is.
     h, tau, sd = 0.5, WANDER["time_constant"], np.array(WANDER["standard_deviation"][:2])
@@ -170,6 +172,7 @@ def test_statistics_of_the_wandering_current():
     assert abs(np.mean(u[1, :, 0] * u[1, :, 1])) < ERRORS / np.sqrt(MEMBERS)
 
 
+@pytest.mark.ci
 def test_a_stationary_start():
     # The vehicle rests over ground and the water has u(0): the velocity over ground is u(t) - u(0). It turns by 1e-10.
     tau, sd = WANDER["time_constant"], np.array(WANDER["standard_deviation"][:2])
@@ -181,6 +184,7 @@ def test_a_stationary_start():
     assert np.abs(got - change).max() < ERRORS * change * np.sqrt(2.0 / MEMBERS)
 
 
+@pytest.mark.ci
 def test_the_wandering_current_is_that_of_the_twin():
     # At rest in the water a neutral vehicle shows u(t), here by the process itself; and the seed's high word counts.
     seed, h, steps = 12 + (34 << 32), 0.1, 50
@@ -226,6 +230,7 @@ def test_same_bits(name, dtype):
     assert len(np.unique(whole[-1, :, 0])) > 0.99 * 700
 
 
+@pytest.mark.ci
 def test_two_terms_of_a_type_draw_their_own_numbers():
     numbers = dict(standard_deviation=(0.3, 0.3, 0.3), time_constant=1.0)
     result = lw.solve(ensemble(*in_water(wander=numbers, second=numbers), seed=3), h=0.5, t1=10.0)
@@ -237,6 +242,7 @@ def test_two_terms_of_a_type_draw_their_own_numbers():
 FULL = TURN @ np.diag([1.0, 2.0, 3.0]) @ TURN.T
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("h", [0.1, 0.025])
 def test_growth_under_white_noise(h):
     # Impulses of variance S^2 h: <v^2> = S^2 t / m^2 at every step, exactly, whatever the step is. Without a moment
@@ -248,6 +254,7 @@ def test_growth_under_white_noise(h):
     assert np.abs(growth - 1.0).max() < ERRORS * np.sqrt(2.0 / MEMBERS)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("h", [0.1, 0.025])
 def test_growth_of_the_spin_under_white_noise(h):
     # One moment of inertia: J Om in inertial axes is the sum of turned impulses, each isotropic.
@@ -258,6 +265,7 @@ def test_growth_of_the_spin_under_white_noise(h):
     assert abs(growth - 1.0) < ERRORS * np.sqrt(2.0 / (3 * MEMBERS))
 
 
+@pytest.mark.ci
 def test_noise_does_not_see_the_kernels_axes():
     # Along the user's axes, the impulse of one step is that of the twin.
     term = terms.WrenchNoise(**WRENCH_NOISE)

@@ -107,6 +107,7 @@ def test_the_pressure_gives_added_mass_and_munks_share():
         assert hull.added_mass()[:2] / hull.displaced == pytest.approx((along, across), abs=6e-4)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     ("method", "h", "allowed"), [("rk8", 2e-3, 1e-9), pytest.param("psi_s", 5e-5, 5e-9, marks=pytest.mark.slow)]
 )
@@ -211,6 +212,7 @@ def lopsided(*inputs, center=CENTER, added=ADDED):
     return lw.Scene(body, lw.Environment(GRAVITY), terms=list(inputs))
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     ("method", "h", "allowed"),
     [("psi_x", 1e-5, 1e-8), pytest.param("psi_w", 1e-5, 1e-8, marks=pytest.mark.slow), ("rk8", 2e-3, 1e-10)],
@@ -342,6 +344,7 @@ def heave_and_drift(times, depth, wave, speed):
     return np.hypot(*fit[2:]), fit[1] * times[-1]
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("name", PASSES)
 def test_heave_and_drift_of_a_slender_hull_under_waves(name):
     wave, speed = PASSES[name]
@@ -377,6 +380,7 @@ ORDERS = {
 }  # fmt: skip
 
 
+@pytest.mark.ci
 @pytest.mark.slow_but("rk4-LOPSIDED")
 @pytest.mark.parametrize(("method", "body"), ORDERS)
 def test_methods_keep_their_order_in_waves(method, body):

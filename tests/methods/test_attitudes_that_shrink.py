@@ -10,6 +10,8 @@ import lgvi_warp as lw
 from lgvi_kernels.advance.spec import CHUNK
 from tests.support.tools import one
 
+pytestmark = pytest.mark.ci
+
 STEPS = 1_000_000
 
 

@@ -72,6 +72,7 @@ def test_far_from_the_origin(method):
     assert np.abs(plain.position[-1] - expected).max() > 50.0
 
 
+@pytest.mark.ci
 @pytest.mark.slow_but("psi_s")
 @pytest.mark.parametrize(
     "method", ["psi_s", "psi_x", *(pytest.param(name, marks=SLOW) for name in ("psi", "psi_1", "psi_w"))]
@@ -85,6 +86,7 @@ def test_many_short_steps(method):
     assert plain > 30 * compensated
 
 
+@pytest.mark.ci
 def test_energy_is_kept():
     # Float32 loses or gains energy step by step; what is left with compensation is the rounding of the samples.
     fleet = one(GENERAL, *random_states(3, 4, 0.5, 0.5))
@@ -130,6 +132,7 @@ def test_coupled_inertia(method):
     assert error[1] > 10 * error[0]
 
 
+@pytest.mark.ci
 def test_events_stop_where_they_do():
     # Straight lines from 5 m to the surface, 1e7 m north: the crossing is known.
     scene = lw.Scene(STRAIGHT.vehicle, STRAIGHT.environment, events=[lw.events.Surface()])

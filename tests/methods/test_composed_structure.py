@@ -14,6 +14,7 @@ SWINGING = scene_of(net=1e-13, moment=(0.1, -0.2, -0.5))
 SLOW = ("ss6_13(psi_x)*", "bm6(psi_s)*", "rkn6_11*", "rkn6_14*")
 
 
+@pytest.mark.ci
 @pytest.mark.slow_for(*SLOW)
 @pytest.mark.parametrize("method", METHODS)
 def test_linear_momentum_without_forces(method):

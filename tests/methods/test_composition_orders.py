@@ -61,6 +61,7 @@ def test_coefficients_of_two_parts(name):
 
 
 # The kernels of every kind: compositions of psi_s, halves of psi_x, and both orders of two parts.
+@pytest.mark.ci
 @pytest.mark.slow_for("ss6_13(psi_x)", "su8_15(psi_x)", "ss8_21(psi_x)", "bm?(psi_s)")
 @pytest.mark.parametrize("name", ORDERS)
 def test_order(name, scene, example):
@@ -71,6 +72,7 @@ def test_order(name, scene, example):
     assert lw.Method(name).order == order
 
 
+@pytest.mark.ci
 @pytest.mark.slow_for("kl8(psi_x)*", "su8_15(psi_x)*", "ss8_21(psi_x)*")
 @pytest.mark.parametrize(("method", "h", "at_most"), [
     ("kl8(psi_x)", 0.05, 1e-12), ("su8_15(psi_x)", 0.05, 1e-12), ("ss8_21(psi_x)", 0.1, 1e-12), ("ss8_21(psi_s)", 0.1, 2e-12),
@@ -80,6 +82,7 @@ def test_errors_at_five_seconds(method, h, at_most, scene, example):
     assert error(scene, method, h, example) < at_most
 
 
+@pytest.mark.ci
 @pytest.mark.slow_but("bm6(psi_x)")
 @pytest.mark.parametrize("method", ["ss6_13(psi_x)", "bm6(psi_x)", "rkn6_11"])
 def test_float32_reaches_its_round_off(method, scene, example):

@@ -61,6 +61,7 @@ def test_compositions(name, dtype):
     assert difference(end, from_state(body, x)) < (ROUND_OFF if dtype == "float64" else SINGLE)
 
 
+@pytest.mark.ci
 @pytest.mark.slow_but("bm6(psi)-*")
 @pytest.mark.parametrize(("method", "dtype"), [("bm4(psi_s)", "float64"), ("bm6(psi_s)", "float64"),
                                                ("bm6(psi)", "float64"), ("bm6(psi_s)", "float32")])  # fmt: skip
@@ -109,6 +110,7 @@ def test_halves_with_drag():
     assert difference(last(result), reduced.from_reduced(x)) < ROUND_OFF
 
 
+@pytest.mark.ci
 @pytest.mark.slow_but("*-diagonal-*")
 @pytest.mark.parametrize(
     ("shape", "dtype"),
@@ -124,6 +126,7 @@ def test_two_parts(name, shape, dtype):
     assert difference(end, from_state(body, x)) < (ROUND_OFF if dtype == "float64" else SINGLE)
 
 
+@pytest.mark.ci
 @pytest.mark.slow_for("rkn6_11")
 @pytest.mark.parametrize("method", ["bm4(psi_x)", "rkn6_11", "rkn6_14"])
 def test_events_change_round_off_only(method):

@@ -82,6 +82,7 @@ SEVERAL = {
 SHORT = ("psi_x-in harmonics", "psi_x8-None", "psi_w-in a profile")
 
 
+@pytest.mark.ci
 @pytest.mark.slow_but(*SHORT)
 @pytest.mark.parametrize("name", [None, *SEVERAL, *CASES])
 @pytest.mark.parametrize("method", PROGRAMS)
@@ -95,6 +96,7 @@ def test_a_few_steps(method, name):
     assert difference(last(result), twin(laws, method, 0.02, 5)) < 5e-13
 
 
+@pytest.mark.ci
 def test_a_fixed_number_of_newton_steps():
     # Two from a start of order 2 leave a residual below the tolerance at this step; with checks, each lane says so.
     fleet = one(scene_of(()), **STATE)

@@ -34,6 +34,7 @@ def run(vehicle, terms, state, h, t1, method="psi_s", **named):
     return lw.solve(one(scene, **state), method, h=h, t1=t1, **named)
 
 
+@pytest.mark.ci
 @pytest.mark.slow_for("psi", "psi_1*")
 @pytest.mark.parametrize("method", ["psi_s", "psi_1", "psi_x", "psi"])
 def test_terminal_fall(method):
@@ -66,6 +67,7 @@ def test_drag_alone_is_exact_at_any_stiffness(method, kappa):
         assert u == pytest.approx(expected, rel=1e-15 * (10.0 + min(kappa, 700.0)), abs=1e-300)
 
 
+@pytest.mark.ci
 @pytest.mark.slow_for("psi_1*", "psi_x8*")
 @pytest.mark.parametrize("method", ["psi_s", "psi_1", "psi_x", "psi_x8"])
 def test_steady_helix(method):
@@ -88,6 +90,7 @@ def test_steady_helix(method):
     assert slope(steps, errors) == pytest.approx(2.0, abs=0.1)
 
 
+@pytest.mark.ci
 @pytest.mark.slow_but("psi_s")
 @pytest.mark.parametrize("method", ["psi_s", "psi_x", "psi"])
 def test_equilibrium_pitch_of_a_trim_moment(method):
@@ -102,6 +105,7 @@ def test_equilibrium_pitch_of_a_trim_moment(method):
     assert np.abs(r.angular_velocity[-1]).max() < 1e-12
 
 
+@pytest.mark.ci
 @pytest.mark.slow_but("psi_s")
 @pytest.mark.parametrize("method", ["psi_s", "psi_1", "psi_x", "psi", "kl6(psi_s)"])
 def test_a_steady_current_only_carries(method):
@@ -121,6 +125,7 @@ def test_a_steady_current_only_carries(method):
     assert np.abs(moving.velocity[-1, 0] - still.velocity[-1, 0] - still.attitude[-1, 0].T @ u).max() < bound
 
 
+@pytest.mark.ci
 def test_a_neutral_body_at_rest_goes_with_accelerating_water():
     # rho V = m: the water's acceleration pushes the body as it pushes the water. R = I, M anisotropic: no relative motion.
     schedule = terms.CurrentProfile(depths=(0.0, 100.0), velocities=((0.5, 0.0, 0.0), (0.5, 0.0, 0.0)))
@@ -129,6 +134,7 @@ def test_a_neutral_body_at_rest_goes_with_accelerating_water():
     assert np.abs(r.position[-1, 0] - (5.0, 0.0, 10.0)).max() < 1e-12
 
 
+@pytest.mark.ci
 def test_shear_lifts_a_sphere_that_falls_through_it():
     # A neutral sphere of mass m and added mass a in u = s b3 along north: (m + a) nu_1' = -m s nu_3, and by Auton's lift
     # (m + a) nu_3' = -a s nu_1. From nu = (0, 0, w) over ground v_1 = w sqrt(a / m) sinh(k t) and v_3 = w cosh(k t).

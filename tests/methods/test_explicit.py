@@ -65,6 +65,7 @@ def both(scene, body, method, h, steps, at=STATE, **named):
 ALONE, PLAIN = Case((), ()), CASES["wrench"]
 
 
+@pytest.mark.ci
 @pytest.mark.slow_but("rk4-alone", "rkmk4-alone")
 @pytest.mark.parametrize("case", [ALONE, PLAIN], ids=["alone", "wrench"])
 @pytest.mark.parametrize("method", METHODS)
@@ -107,6 +108,7 @@ def test_one_step_with_all_laws(names):
     assert difference(*both(test_terms.scene_of(case), test_terms.body_of(case), "rk4", 0.02, 1)) < 1e-13
 
 
+@pytest.mark.ci
 @pytest.mark.slow_but("cg3")
 @pytest.mark.parametrize("method", ["rk5", "rk5_ck", "rk8", "cg3", "rkmk4"])
 def test_one_step_with_several_laws(method):
@@ -128,6 +130,7 @@ def test_one_step_with_each_law(method, name):
     assert difference(*both(scene, body, method, 0.02, 1)) < 1e-13
 
 
+@pytest.mark.ci
 @pytest.mark.slow_for("cg3-None*", "rk8*", "rkmk4-drag matrix*")
 @pytest.mark.parametrize(
     ("method", "name"),
@@ -157,6 +160,7 @@ def test_forces_that_never_change(method, current):
             assert difference(*both(scene, body, method, 0.05, steps, at)) < bound
 
 
+@pytest.mark.ci
 @pytest.mark.slow_for("rk5_ck", "rk8")
 @pytest.mark.parametrize("method", ["rk5", "rk5_ck", "rk8"])
 def test_chosen_steps(method):

@@ -67,6 +67,7 @@ def test_R_stays_on_the_group(method, h, drift):
     assert drift(method, h) < 1e-13
 
 
+@pytest.mark.ci
 @pytest.mark.slow_for("rk5*")
 @pytest.mark.parametrize("tolerance", [1e-4, 1e-7, 1e-10])
 @pytest.mark.parametrize("method", ["rk5", "rk5_ck", "rk8"])
@@ -82,6 +83,7 @@ def test_a_tolerance_in_float32(run, example):
     assert difference(end, expected(example["truth"]["5"])) < 3e-5
 
 
+@pytest.mark.ci
 def test_steps_go_on_from_sample_to_sample(scene, example):
     method = lw.Method("rk8", rtol=1e-9, atol=1e-9)
     free, sampled = (lw.solve(lw.Ensemble(scene), method, h=h, t1=5.0) for h in (5.0, 0.5))
@@ -91,6 +93,7 @@ def test_steps_go_on_from_sample_to_sample(scene, example):
     assert 10 <= made <= tried <= free.provenance["steps_tried"] + 10
 
 
+@pytest.mark.ci
 def test_the_same_bits_for_any_number_of_threads(scene):
     fleet = lw.Ensemble(scene, 700, 3, {"start.angular_velocity": lw.distributions.Normal(relative=0.3)})
     method = lw.Method("rk8", rtol=1e-9, atol=1e-12)
@@ -99,6 +102,7 @@ def test_the_same_bits_for_any_number_of_threads(scene):
         assert np.array_equal(getattr(a, name), getattr(b, name))
 
 
+@pytest.mark.ci
 def test_one_that_fails_leaves_the_others(scene):
     # Member 3 turns so fast that 100,000 steps do not end one h; member 5 overflows. Both are in the first packet.
     n = 8
@@ -135,6 +139,7 @@ def test_an_event_is_seen_at_the_end_of_h(scene):
     assert result.failure_time[0] == pytest.approx(1.3)
 
 
+@pytest.mark.ci
 @pytest.mark.slow_for("1*")
 @pytest.mark.parametrize(("width", "dtype"), [(1, "float64"), (2, "float32")])
 def test_narrow_packets(width, dtype, run, example):
@@ -157,6 +162,7 @@ def test_water_is_taken_at_the_users_origin():
     assert difference(last(lw.solve(one(scene, **start), "psi", h=0.001, t1=1.0)), truth) < 1e-5
 
 
+@pytest.mark.ci
 def test_momentum_without_forces():
     free, method = free_scene((25.0, 42.0, 45.0), (1.5, 4.0, 4.5)), lw.Method("rk8", rtol=1e-9, atol=1e-9)
     end = lw.solve(one(free, **test_terms.STATE), method, h=0.02, t1=2.0)

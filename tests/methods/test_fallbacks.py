@@ -24,6 +24,7 @@ def fast(n=5, spin=30.0):
     return b, R, nu, Om
 
 
+@pytest.mark.ci
 def test_raise_keeps_the_result(scene):
     with pytest.raises(
         lw.MembersFailed, match=r"step_too_large, 2 of 5 members \(first: member 1 at 0 s.*Shorten"
@@ -59,6 +60,7 @@ def test_a_steady_spin_by_divided_steps(method, part, parts):
     np.testing.assert_allclose(result.attitude[-1, 0], expected, atol=1e-15 * 2 * parts * steps * 8)
 
 
+@pytest.mark.ci
 def test_what_no_division_helps_is_frozen(scene):
     result = lw.solve(one(scene, Om=[0.0, 0.0, 1.1 * 2048 / 0.1]), "psi_s", h=0.1, t1=0.5, on_failure="substep")
     assert list(result.status) == [Status.STEP_TOO_LARGE]
@@ -66,6 +68,7 @@ def test_what_no_division_helps_is_frozen(scene):
     np.testing.assert_allclose(result.failure_value, 1.1 * 1024, rtol=1e-12)
 
 
+@pytest.mark.ci
 @pytest.mark.slow_for("kl6*")
 @pytest.mark.parametrize("method", ["psi", "psi_s", "kl6(psi_s)"])
 def test_divided_steps_are_those_of_a_shorter_step(scene, method):
@@ -83,6 +86,7 @@ def test_divided_steps_are_those_of_a_shorter_step(scene, method):
         np.testing.assert_allclose(getattr(whole, name), getattr(half, name), rtol=1e-10, atol=1e-10)
 
 
+@pytest.mark.ci
 @pytest.mark.slow_for("float32")
 @pytest.mark.parametrize("dtype", ["float64", "float32"])
 def test_the_others_keep_their_bits(scene, dtype):
@@ -105,6 +109,7 @@ def test_the_others_keep_their_bits(scene, dtype):
         )
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("method", ["psi", "psi_s"])
 def test_symmetry_is_kept(scene, method):
     # There, all velocities turned round, and back again: a symmetric step undoes itself, divided or not.
@@ -155,6 +160,7 @@ def pushed_to_the_wall(force):
                     events=[lw.events.Box(lower=[-9.0] * 3, upper=[1.0, 9.0, 9.0])])  # fmt: skip
 
 
+@pytest.mark.ci
 def test_events_stop_a_divided_step():
     scene = pushed_to_the_wall(1e-30)
     fleet = one(scene, R=lw.notation.matrix_from_rotation_vector(np.array([0.0, np.pi / 2, 0.0])), b=[[0.0] * 3] * 2,
@@ -166,6 +172,7 @@ def test_events_stop_a_divided_step():
     np.testing.assert_allclose(result.failure_time, 0.5, atol=1e-9)
 
 
+@pytest.mark.ci
 def test_times_of_laws_pass_in_divided_steps():
     # Divided steps see their own times.
     result = lw.solve(

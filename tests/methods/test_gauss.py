@@ -54,10 +54,12 @@ def test_some_steps(name):
     assert difference(*both(name, 0.1)) < 2e-13
 
 
+@pytest.mark.ci
 def test_float32():
     assert difference(*both("gauss6", 0.1, "float32")) < 5e-6
 
 
+@pytest.mark.ci
 def test_forces_of_position_and_time():
     force, torque = [3.0, -2.0, 1.0], [0.3, 0.1, -0.2]
     term, law = lw.terms.Wrench(force=force, torque=torque), Wrench(force=np.array(force), torque=np.array(torque))
@@ -84,6 +86,7 @@ def test_gauss_12_reaches_the_truth(scene, example):
     assert difference(last(run(scene, "gauss12", 0.25)), expected(example["truth"]["5"])) < 1e-12
 
 
+@pytest.mark.ci
 def test_a_fixed_number_of_iterations(scene, example):
     # Ten are not enough for the strict tolerance of a fixed number, and said so; with a loose one the error shows.
     few = run(scene, lw.Method("gauss6", iterations=3), 0.1)

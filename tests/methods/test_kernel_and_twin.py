@@ -54,6 +54,7 @@ def both(shape, method, solver, steps, dtype="float64", iterations=None, h=0.01)
 QUICK = ("diagonal-*-quartic", "*-psi-quartic", "both full-psi_s-cayley", "both full-psi_s-newton")
 
 
+@pytest.mark.ci
 @pytest.mark.slow_but(*QUICK)
 @pytest.mark.parametrize(("method", "solver"), PAIRS)
 @pytest.mark.parametrize("shape", SHAPES)
@@ -63,6 +64,7 @@ def test_one_step(shape, method, solver):
     assert difference(kernel, twin) < 1e-13
 
 
+@pytest.mark.ci
 @pytest.mark.slow_but(*QUICK)
 @pytest.mark.parametrize(("method", "solver"), PAIRS)
 @pytest.mark.parametrize("shape", ["diagonal", "both full"])
@@ -72,6 +74,7 @@ def test_five_seconds(shape, method, solver):
     assert difference(kernel, twin) < 1e-11
 
 
+@pytest.mark.ci
 @pytest.mark.slow_but("diagonal-psi_s", "* full-psi_s", "full *-psi_s")
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("shape", SHAPES)
@@ -89,6 +92,7 @@ def test_float32_on_the_paper_example(method, key, example, scene):
     assert difference(last(result), expected(example[f"{key}_h0.01"]["5"])) < 1e-5
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     ("solver", "iterations"),
     chosen(
@@ -106,6 +110,7 @@ def test_fixed_iterations_make_the_same_error(solver, iterations):
 
 
 # Registers of AVX-512 and of AVX2 and one lane, as on a GPU, in the short tests; two lanes in test_explicit_orders.py.
+@pytest.mark.ci
 @pytest.mark.parametrize(
     ("width", "dtype"),
     chosen(
@@ -124,6 +129,7 @@ def test_every_width(width, dtype, example, scene):
 KEYS = {"phi": "Phi", "phi_adjoint": "PhiAdj", "psi": "Psi", "psi_s": "PsiS", "psi_1": "Psi1"}
 
 
+@pytest.mark.ci
 @pytest.mark.slow_but("*-quartic")
 @pytest.mark.parametrize(("method", "solver"), PAIRS)
 def test_states_of_the_paper_example(method, solver, example, scene):

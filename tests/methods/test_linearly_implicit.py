@@ -107,6 +107,7 @@ def both(scene, body, at, h, steps, **named):
 COUPLED = together("drag matrix", "current profile", "body lift", "wrench")
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     "named",
     [{"width": 1}, pytest.param({}, marks=pytest.mark.slow), pytest.param({"width": 4}, marks=pytest.mark.slow)],
@@ -138,6 +139,7 @@ def remus(h, t1, velocity, method=METHOD):
     return np.concatenate(last(result)[2:])
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("h", [0.02, 0.2, 0.5])
 def test_a_steady_turn_is_a_fixed_point(h):
     # From the way ahead: after 150 s the transient is exp(-0.17 t) = 1e-11, and the root is exact to 1e-13.
@@ -168,6 +170,7 @@ def falling(linear, quadratic, h, steps, method=METHOD, speed=0.0):
 NET = 20.0 * 9.8 - 150.0
 
 
+@pytest.mark.ci
 def test_terminal_fall():
     # v' = (net - q v^2) / 45 kg: rate 2 q v / 45 = 6.4 1/s, so nothing is left of the start after 30 s.
     end = falling(0.0, 450.0, 0.2, 150)[-1]

@@ -84,6 +84,7 @@ STEPS = {
 }  # fmt: skip
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("name", STEPS)
 def test_the_twin_keeps_the_order(name, body, truth):
     errors = []
@@ -108,6 +109,7 @@ def test_a_turn_within_a_step_costs_order(body, truth):
 ROUGH = together("thrusters", "control fins with rates")
 
 
+@pytest.mark.ci
 @pytest.mark.slow_but("rk4-float64*")
 @pytest.mark.parametrize(
     ("method", "dtype", "bound"),

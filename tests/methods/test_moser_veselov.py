@@ -15,6 +15,7 @@ from tests.support.tools import difference, one, scene_of
 EXPLICIT = lw.Method("psi_1", "moser_veselov", 0, 0.5)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("h", [0.01, 0.1, 0.5])
 def test_one_step(h):
     kernel, eigenvectors = both("both full", "psi_s", "moser_veselov", 1, h=h)
@@ -23,11 +24,13 @@ def test_one_step(h):
     assert difference(kernel, eigenvectors) < 1e-12
 
 
+@pytest.mark.ci
 def test_five_seconds():
     kernel, _ = both("both full", "psi_s", "moser_veselov", 500)
     assert difference(kernel, both("both full", "psi_s", "quartic", 500)[1]) < 1e-11
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(("dtype", "eps"), [("float64", 2.2e-16), ("float32", 1.2e-7)])
 @pytest.mark.parametrize("shape", case.SHAPES)
 def test_single_solves(shape, dtype, eps):
@@ -44,6 +47,7 @@ def test_single_solves(shape, dtype, eps):
             np.testing.assert_allclose(turn, rotation.quartic(J * rate, np.diag(J)), atol=50 * eps)
 
 
+@pytest.mark.ci
 def test_a_sphere():
     rates = 0.5 * case.directions(8)
     F = case.by_kernel(EXPLICIT, "float64", np.ones(3), rates)

@@ -83,6 +83,7 @@ def test_small_oscillations_end_at_linear_theory(motion, method):
     assert close(first, limit) if limit < 8.0 else first == math.inf
 
 
+@pytest.mark.ci
 @pytest.mark.slow_but("psi")
 @pytest.mark.parametrize("method", EXPLICIT_DRAG)
 def test_explicit_drag_ends_at_linear_theory(method):

@@ -27,6 +27,7 @@ def change(values):
     return np.abs(values - values[:1]).max()
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("shape", FREE)
 @pytest.mark.parametrize("method", METHODS)
 def test_linear_momentum_without_forces(shape, method):
@@ -35,6 +36,7 @@ def test_linear_momentum_without_forces(shape, method):
     assert change(P) < 1e-11
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     ("shape", "method"), [("general", m) for m in SYMPLECTIC] + [("isotropic", m) for m in METHODS]
 )
@@ -45,6 +47,7 @@ def test_angular_momentum_without_forces(shape, method):
     assert change(L) < 1e-11 * max(1.0, reach)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(("method", "sign"), [("phi", -1.0), ("phi_adjoint", 1.0)])
 def test_phi_keeps_a_shifted_angular_momentum(method, sign):
     # For general M, Phi keeps L - h P x R nu and Phi* keeps L + h P x R nu (mathematics, section 5), and not L itself.
@@ -63,6 +66,7 @@ def test_psi_keeps_neither_but_within_the_square_of_the_step():
     assert slope(steps, changes) == pytest.approx(2.0, abs=0.3)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(("dtype", "bound"), [("float64", 1e-12), ("float32", 3e-6)])
 def test_attitude_stays_orthogonal(dtype, bound, scene):
     # float64: raw products, 1e6 steps (mathematics, section 5). float32: renormalised every 128 steps,
@@ -72,6 +76,7 @@ def test_attitude_stays_orthogonal(dtype, bound, scene):
     assert np.abs(np.swapaxes(R, 1, 2) @ R - np.eye(3)).max() < bound
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     ("forward", "back", "steps"),
     [(method, method, steps) for method in ("psi", "psi_s", "psi_1") for steps in (1, 500)]
@@ -105,6 +110,7 @@ slow = pytest.mark.slow
 COMPOSED = ("psi_w", "bm6(psi_x)", "kl8(psi_x)", "rkn4_6", "rkn6_14")
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     "method", [*SYMPLECTIC, "su4(psi_s)", "psi_x", "bm4(psi_x)", *(pytest.param(name, marks=slow) for name in COMPOSED)]
 )
@@ -124,6 +130,7 @@ def test_others_are_symplectic_to_their_order_only(method, order):
     assert 0.7 * 2.0 ** (order + 1) < defects[0] / defects[1] < 1.5 * 2.0 ** (order + 1)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("method", ["phi", "phi_adjoint", "psi"])
 def test_the_papers_maps_are_symplectic_for_isotropic_mass(method):
     assert symplectic_defect(method, 0.1, EQUAL) < 1e-9
@@ -137,6 +144,7 @@ def test_psi_is_not_symplectic_for_anisotropic_mass():
     assert slope(steps, defects) == pytest.approx(3.0, abs=0.3)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("axis", [0, 1, 2])
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("omega", [0.1, 3.0, 9.9])
@@ -153,6 +161,7 @@ def test_spin_about_a_principal_axis(axis, method, omega):
     assert np.abs(last(result)[3] - Om).max() < 1e-12 * omega
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("method", METHODS)
 def test_vertical_fall(method):
     # R = I, force net along b3, mass m: symplectic Euler under Phi, Verlet under Psi, PsiS, Psi1 (position exact).

@@ -77,6 +77,7 @@ def test_a_fall_against_drag():
     np.testing.assert_allclose(slopes_of_fall("rk8", 0.02), expected, rtol=1e-10, atol=1e-11 * np.abs(expected).max())
 
 
+@pytest.mark.ci
 @pytest.mark.slow_for("psi_x")
 @pytest.mark.parametrize("method", ["psi_s", "psi_x"])
 def test_derivatives_have_the_order_of_the_method(method):
@@ -156,6 +157,7 @@ def vee(A):
     return 0.5 * np.stack([A[2, 1] - A[1, 2], A[0, 2] - A[2, 0], A[1, 0] - A[0, 1]])
 
 
+@pytest.mark.ci
 def test_psi_s_is_symplectic():
     # Perturbations (xi, eta) = (R^T db, vee(R^T dR)) of the pose and dmu of the momenta mu = (p, pi) in body axes. The form is
     # dmu1.zeta2 - dmu2.zeta1 - mu.[zeta1, zeta2], with the bracket of se(3).
@@ -211,6 +213,7 @@ def assert_agree(scene, sizes, method, part, **settings):
             np.testing.assert_allclose(got, expected, rtol=0.0, atol=part * np.abs(expected).max() + 1e-9)
 
 
+@pytest.mark.ci
 def test_remus_against_differences():
     # Steps of 1e-4: an error of 1e-16 / 1e-4 in sizes of 10, and of the 4th power of the step, but where drag has a kink.
     start = {"velocity": [1.5, 0.05, 0.1], "euler_deg": [2.0, 3.0, 4.0], "angular_velocity": [0.01, 0.02, 0.03]}
@@ -289,6 +292,7 @@ def test_values_are_those_of_the_run_without_tangents():
     assert not plain.tangents
 
 
+@pytest.mark.ci
 def test_a_file_holds_them(tmp_path):
     masses = lw.designs.Table({"vehicle.mass": [20.0, 21.0, 22.0]})
     fleet = lw.Ensemble(falling(), sampling=masses)
@@ -371,6 +375,7 @@ def test_the_times_of_a_schedule_in_steps_have_no_derivative():
         lw.solve(scene, "psi_x", h=0.1, t1=0.3, tangents=["wrench_schedule.times[1]"])
 
 
+@pytest.mark.ci
 def test_thrusters_at_their_limits_against_differences():
     """Bounded least squares sums products over rows of the memory, which have a rule of their own for dual lanes."""
     controller = lw.Controller(
@@ -392,6 +397,7 @@ def test_thrusters_at_their_limits_against_differences():
     np.testing.assert_allclose(np.ravel(found), (ahead - behind) / (2.0 * shift), atol=1e-9)
 
 
+@pytest.mark.ci
 def test_a_predictive_law_at_its_limits_against_differences():
     """Its iterations divide a number by a lane, which Warp's own quotient did slope by slope."""
     T, shift = 0.1, 1e-4
@@ -425,6 +431,7 @@ def test_a_number_that_changes_nothing_is_refused():
         lw.solve(looped(), "rk8", h=PERIOD / 2, t1=1.0, tangents=["environment.water_density"])
 
 
+@pytest.mark.ci
 def test_axes_that_jump_are_refused():
     # psi_s works in principal axes, and two equal moments of inertia leave these open: a product of inertia turns them by 45
     # degrees, however small it is.
@@ -439,6 +446,7 @@ TUMBLING = lw.Start(NONE, euler_deg=(10.0, 20.0, 30.0), velocity=(0.5, -0.2, 0.1
 PRODUCTS = ((0, 1), (0, 2), (1, 2))
 
 
+@pytest.mark.ci
 @pytest.mark.slow_but("*-psi_s")
 @pytest.mark.parametrize("kind", ["psi_s", "psi_x", "rk4", "drag"])
 @pytest.mark.parametrize("moments", [(1.0, 3.0, 4.0), (4.0, 1.5, 3.0)])
@@ -502,6 +510,7 @@ def test_no_function_of_lanes_is_without_a_rule():
     assert unknown - {"third"} == moved
 
 
+@pytest.mark.ci
 def test_warps_adjoint_gives_silent_zeros():
     # Native functions have no adjoint there: a gradient by a tape of Warp's would be 0, and not an error.
     Lane = lane(2, wp.float64)

@@ -72,6 +72,7 @@ AXES = {
 }
 
 
+@pytest.mark.ci
 @pytest.mark.slow_but("rk8-turned")
 @pytest.mark.parametrize("axes", AXES)
 @pytest.mark.parametrize("method", ["rk8", "rkmk4"])

@@ -58,6 +58,7 @@ def test_error_against_truth(method, key, t1, run, example):
     np.testing.assert_allclose(measured, published, rtol=1e-4)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("method", ERRORS)
 def test_errors_at_two_seconds(method, run):
     truth = run("kl8(psi_s)", 0.05, 2.0)[1]

@@ -47,6 +47,7 @@ WAYS = {
 }
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 @pytest.mark.parametrize(
     "way", [w if w != "one process more" else pytest.param(w, marks=pytest.mark.slow) for w in WAYS]
@@ -67,6 +68,7 @@ def test_members_above_the_surface_are_counted(way, truth, tmp_path):
     assert heights.max() > truth.max() - 0.1
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_looks_depend_on_no_launch_and_change_no_bit(monkeypatch):
     """Members in blocks of their own, a run in two parts, and one without looks between launches."""
@@ -88,6 +90,7 @@ def test_looks_depend_on_no_launch_and_change_no_bit(monkeypatch):
     assert len(counted(without)) < len(counted(whole))
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_without_waves_members_that_end_above_are_counted_by_any_way():
     """A sphere lighter than water in linear drag rises at a known speed; one member is heavier and sinks."""
@@ -102,6 +105,7 @@ def test_without_waves_members_that_end_above_are_counted_by_any_way():
         assert result.warning_value[0] == pytest.approx(0.5 * (END - 0.5) - 1.0, abs=0.01)
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 @pytest.mark.parametrize("way", ["event", "term", "box"])
 def test_a_scene_that_knows_its_surface_counts_none(way):
@@ -116,6 +120,7 @@ def test_a_scene_that_knows_its_surface_counts_none(way):
     assert not any("above the surface" in text for text in result.messages)
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_a_start_at_the_surface_counts_and_one_above_it_is_told_of_by_itself():
     """Members at the surface, at the default start, and above it."""

@@ -111,6 +111,7 @@ def test_water_that_is_the_same_everywhere_has_no_code_for_its_slopes(name, pres
     assert "dry_lever" not in text
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("name", MARKS)
 def test_a_term_adds_its_code_and_no_other(name, tmp_path):
     text = source(lw.Scene(BARE, lw.Environment(gravity=9.8), terms=list(CASES[name].terms)), tmp_path)
@@ -228,6 +229,7 @@ def test_unphysical_members_are_counted():
         lw.Ensemble(scene(), 50, 1, {"current.velocty": lw.distributions.Normal(std=0.1)})
 
 
+@pytest.mark.ci
 def test_a_controller_that_is_absent_is_no_code(tmp_path):
     wanted = lw.Controller(
         period=0.1, guidance=[lw.control.SetPoint(heading=0.5)], laws=[lw.control.HeadingPID(kp=1.0)]

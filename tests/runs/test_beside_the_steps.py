@@ -68,6 +68,7 @@ def functions(text):
     }
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("case", CASES)
 def test_no_function_gets_a_copy_of_what_the_packet_holds(case, tmp_path):
     scene, method, settings, expected = CASES[case]
@@ -91,6 +92,7 @@ def test_energy_is_computed_where_something_reads_it(checks, views, tmp_path):
     assert bool(re.search(r"> energy;", text)) == (views > 0)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("method", ["psi_s", "rk4"])
 def test_what_is_looked_at_changes_no_bit(method):
     fleet = lw.Ensemble(

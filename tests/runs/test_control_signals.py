@@ -130,6 +130,7 @@ def free(result):
     return np.flatnonzero(result.status == 0)
 
 
+@pytest.mark.ci
 def test_a_sample_on_a_tick_shows_what_that_tick_demands(complete):
     at, well = looked(), free(complete)
     assert 50 < len(well) < MEMBERS
@@ -189,6 +190,7 @@ def test_a_member_that_an_event_stops_keeps_the_signals_of_its_last_whole_step(c
             assert (values[k + 1 :, member] == values[k, member]).all(), name
 
 
+@pytest.mark.ci
 def test_threads_launches_and_blocks_give_the_same_bits(complete, monkeypatch):
     assert same(complete, lw.solve(fleet(), "psi_s", **SETTINGS, threads=1))
     few = lw.solve(fleet(), "psi_s", **SETTINGS | {"save": lw.SaveAt(at=[0.1, 0.23], fields=SAVED)}, threads=2)
@@ -200,6 +202,7 @@ def test_threads_launches_and_blocks_give_the_same_bits(complete, monkeypatch):
     assert same(complete, lw.solve(fleet(), "psi_s", **SETTINGS))
 
 
+@pytest.mark.ci
 def test_signals_change_nothing_of_the_motion_and_cost_nothing_where_nobody_asks(complete):
     settings = SETTINGS | {"save": lw.SaveAt(every=H)}
     plan = make_plan(fleet(), "psi_s", **settings)
@@ -253,6 +256,7 @@ def check_spoiled(complete, spoiled):
             assert (spoiled.command[:, member] == 0.0).all()
 
 
+@pytest.mark.ci
 def test_a_law_that_gives_no_number_ends_its_member_alone(complete):
     spoiled = lw.solve(fleet(spoiled=SPOILED), "psi_s", **SETTINGS)
     check_spoiled(complete, spoiled)
@@ -288,6 +292,7 @@ def test_a_tick_sees_both_parts_of_compensated_sums():
         np.testing.assert_allclose(there, here, rtol=0.0, atol=2.0**-22 * np.abs(here).max(), err_msg=name)
 
 
+@pytest.mark.ci
 def test_a_store_holds_them_and_goes_on(complete, tmp_path):
     path, part = tmp_path / "whole.zarr", tmp_path / "part.zarr"
     stored = lw.solve(fleet(), "psi_s", **SETTINGS, store=path)
@@ -307,6 +312,7 @@ def test_a_store_holds_them_and_goes_on(complete, tmp_path):
     assert set(loaded.samples) == set(SAVED)
 
 
+@pytest.mark.ci
 @pytest.mark.slow_for("laws1")
 @pytest.mark.parametrize(
     "laws", [[HeadingPID(kp=KP)], [Callback(lambda t, y, r, members: np.zeros((len(members), 6)))]]
@@ -328,6 +334,7 @@ def test_a_file_knows_which_terms_the_controller_drives(laws, tmp_path):
         assert (tmp_path / "fleet.png").stat().st_size > 0
 
 
+@pytest.mark.ci
 def test_members_that_are_kept_after_all_have_them(complete, tmp_path):
     kept = lw.solve(fleet(), "psi_s", **SETTINGS, keep=[5, 300]).kept
     stored = lw.solve(fleet(), "psi_s", **SETTINGS, keep=[5, 300], store=tmp_path / "run.zarr").kept
@@ -373,6 +380,7 @@ def test_a_scene_without_a_controller_has_none(requested, text):
         lw.solve(scene(controller=False), "psi_s", h=H, t1=1.0, **requested)
 
 
+@pytest.mark.ci
 def test_names_that_are_not_known():
     with pytest.raises(lw.SceneError, match=r"save.fields = 'commands' is not known. Did you mean 'command'\?"):
         lw.SaveAt(fields=("commands",))

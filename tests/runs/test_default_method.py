@@ -183,6 +183,7 @@ def test_it_is_told_and_kept(tmp_path):
     assert request_of(folder).plan().method == lw.Method("rk4")
 
 
+@pytest.mark.ci
 def test_a_prepared_run_chooses_once():
     """Also for members that would choose another method by themselves."""
     slow, fast = (
@@ -323,6 +324,7 @@ def test_the_choice_is_off_by_a_thousandth_of_the_path_or_least(name):
             assert errors[taken] == min(errors.values()), (h, errors)
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_remus_in_a_turn_is_off_by_millimetres_at_a_coarse_step():
     """At 0.25 s rk4 is off by more than a quarter of a metre of 40 m, rk8 by less than 1 mm."""
@@ -349,6 +351,7 @@ duration = 30.0
 """
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 @pytest.mark.parametrize("h", [0.5, 0.375, 0.3, 0.25, 0.05])
 def test_check_and_a_run_state_the_error_that_a_run_has(h, tmp_path, capsys):
@@ -366,6 +369,7 @@ def test_check_and_a_run_state_the_error_that_a_run_has(h, tmp_path, capsys):
     assert lw.solve(fleet, "rk8", h=h, t1=30.0).messages == ()
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 @pytest.mark.parametrize("step", [{}, {"noise_step": 0.5}])
 def test_the_path_of_noise_is_no_error(step):
@@ -378,6 +382,7 @@ def test_the_path_of_noise_is_no_error(step):
     assert lw.solve(lw.Ensemble(scene, 4), h=0.5, t1=5.0).messages == ()
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_an_error_is_measured_in_a_bounded_number_of_steps():
     fleet, _ = turning_remus()
@@ -386,6 +391,7 @@ def test_an_error_is_measured_in_a_bounded_number_of_steps():
     assert measured_error(make_plan(fleet.going_on(first.final), h=0.25, t1=2.0)) is None
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_check_says_what_the_choice_costs(tmp_path, capsys):
     file = tmp_path / "scene.toml"
@@ -403,6 +409,7 @@ def test_check_says_what_the_choice_costs(tmp_path, capsys):
     assert "\nmethod" not in capsys.readouterr().out
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_near_its_limit_a_method_is_taken_before_one_that_is_off_by_more():
     for (fleet, t1), h in ((spinning_bluerov(), 0.5), (turning_remus((0.3, 0.2, 0.1)), 0.375)):

@@ -40,6 +40,7 @@ def ending(terms, capacity, method, h, t1=3.0, **settings):
     return float(result.failure_time[0]), float(result.energy_used[-1, 0])
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("method", ["psi_s", "rk4"])
 def test_a_battery_ends_where_constant_power_ends_it(method):
     held = lw.terms.Thrusters(**PAIR, **TABLE, command=[0.4, -0.7])
@@ -84,6 +85,7 @@ def test_of_two_events_in_one_step_the_earlier_one_stops(method):
             assert result.energy_used[-1, 0] == pytest.approx(HOTEL * min(at, 0.4), rel=1e-12)
 
 
+@pytest.mark.ci
 @pytest.mark.slow_but("psi_s-True")
 @pytest.mark.parametrize("first", [True, False])
 @pytest.mark.parametrize("method", ["psi_s", "rk4"])
@@ -154,6 +156,7 @@ def test_steps_that_are_made_in_parts_count_once():
     np.testing.assert_allclose(divided.energy_used[-1], fine.energy_used[-1], rtol=0.02)
 
 
+@pytest.mark.ci
 def test_neighbours_of_a_member_that_fails_count_once():
     settings = dict(h=0.4, t1=8.0, save=SAVE_ALL, width=4, threads=1)
     quiet, failing = (
@@ -164,6 +167,7 @@ def test_neighbours_of_a_member_that_fails_count_once():
     assert failing.energy_used[-1, 1] <= quiet.energy_used[-1, 0]
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("method", ["psi_s", "rk4"])
 def test_a_run_that_goes_on_goes_on_counting(method):
     scene = scene_of(account(), lw.terms.Thrusters(**PAIR, **TABLE, command=[0.4, -0.7]),
@@ -193,6 +197,7 @@ def test_float32_loses_nothing_over_many_steps(method):
     assert t == pytest.approx(200.0, rel=4e-7)
 
 
+@pytest.mark.ci
 def test_statistics_are_those_of_the_samples():
     hotel = np.linspace(1.0, 9.0, 300)
     fleet = one(scene_of(account()), parameters={"energy_use.hotel": hotel})
@@ -210,6 +215,7 @@ def test_statistics_are_those_of_the_samples():
     assert mean == pytest.approx(2.0 * hotel.mean(), rel=1e-12)
 
 
+@pytest.mark.ci
 def test_a_sweep_means_the_account_by_energy():
     sweep = lw.sweep(scene_of(account()), metrics=["energy"], members=2, h=0.1, t1=2.0, threads=1)
     np.testing.assert_allclose(sweep.values("scene", "energy"), 2.0 * HOTEL, rtol=1e-13)
@@ -280,6 +286,7 @@ def test_what_does_not_go_together_is_a_sentence():
         lw.solve(scene_of(account()), "gauss4", h=0.1, t1=1.0)
 
 
+@pytest.mark.ci
 def test_a_store_has_the_account(tmp_path):
     fleet = one(scene_of(account()), parameters={"energy_use.hotel": np.array([1.0, 2.0, 3.0])})
     run = lw.solve(fleet, "psi_s", h=0.1, t1=2.0, save=SAVE, store=tmp_path / "run.zarr", threads=1)
@@ -287,6 +294,7 @@ def test_a_store_has_the_account(tmp_path):
     np.testing.assert_array_equal(lw.open_run(tmp_path / "run.zarr").energy_used, run.energy_used)
 
 
+@pytest.mark.ci
 def test_pictures_and_recordings_show_it(tmp_path):
     fleet = one(scene_of(account()), parameters={"energy_use.hotel": np.array([1.0, 2.0, 3.0])})
     save = lw.SaveAt(every=0.5, fields=("position", "attitude", "velocity", "angular_velocity", "energy_used"))
@@ -322,6 +330,7 @@ def test_a_lag_in_other_methods(method, most):
     assert result.energy_used[-1, 0] == pytest.approx(exact, rel=most)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("dtype", ["float64", pytest.param("float32_compensated", marks=pytest.mark.slow)])
 def test_a_battery_ends_in_water_that_moves_and_remembers(dtype):
     water = [lw.terms.GaussMarkovCurrent(standard_deviation=[0.1, 0.1, 0.0], time_constant=5.0),
@@ -336,6 +345,7 @@ def test_a_battery_ends_in_water_that_moves_and_remembers(dtype):
     np.testing.assert_allclose(result.energy_used[-1], [3.4, 5.1, 6.0, 6.0], rtol=rel)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("fields", [("position", "energy_used"), ("command", "energy_used", "demand")])
 def test_a_controlled_vehicle_stops_where_its_battery_ends(fields):
     # The controller's rows of the memory lie before those of the account.

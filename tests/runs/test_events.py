@@ -65,6 +65,7 @@ def test_surface_and_floor_at_the_crossing():
     assert (r.end_time[r.status == lw.Status.OK] == 20.0).all()
 
 
+@pytest.mark.ci
 @pytest.mark.slow_but("float32-psi_s", "float64-kl6(psi_s)", "float64-psi_s")
 @pytest.mark.parametrize("method", ["psi_s", "psi_1", "psi", "psi_x", "kl6(psi_s)"])
 @pytest.mark.parametrize("dtype", ["float64", "float32"])
@@ -82,6 +83,7 @@ def test_the_others_do_not_change_by_a_bit(method, dtype):
         assert getattr(near, name)[:, well].tobytes() == getattr(far, name)[:, well].tobytes()
 
 
+@pytest.mark.ci
 def test_the_time_may_vary_by_member():
     at = np.linspace(0.02, 1.5, 64)
     ensemble = fleet(64, stops(at=9.0), parameters={"time.at": at})
@@ -92,6 +94,7 @@ def test_the_time_may_vary_by_member():
     assert np.isnan(r.failure_time[~stopped]).all()
 
 
+@pytest.mark.ci
 @pytest.mark.slow_but("psi_s")
 @pytest.mark.parametrize("method", ["psi_s", "psi_x", "psi_w"])
 def test_events_look_at_the_users_origin(method):
@@ -107,6 +110,7 @@ def test_events_look_at_the_users_origin(method):
     assert r.failure_time[0] == pytest.approx(1.0, abs=1e-9)
 
 
+@pytest.mark.ci
 def test_a_users_condition():
     r = lw.solve(fleet(50, stops(radius=2.0)), h=0.05, t1=5.0)
     assert r.status.counts().keys() == {"ok", "condition"}
@@ -119,6 +123,7 @@ def test_a_users_condition():
     np.testing.assert_array_equal(r.position[-1, ~away], r.position[0, ~away])
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("dtype", ["float64", "float32"])
 @pytest.mark.parametrize("method", ["psi_s", "rk4"])
 def test_all_that_begin_beyond_an_event_are_stopped_at_once(method, dtype):
@@ -149,6 +154,7 @@ def test_all_that_begin_beyond_an_event_are_stopped_at_once(method, dtype):
         (r.end_time[r.status == lw.Status.FLOOR] <= t).sum() / 12 for t in r.time]  # fmt: skip
 
 
+@pytest.mark.ci
 def test_a_start_at_the_surface_is_no_end():
     scene = lw.Scene(
         VEHICLE, lw.Environment(gravity=GRAVITY), events=stops(surface=0.0), start=lw.Start(velocity=(0, 0, 1.0))
@@ -187,6 +193,7 @@ BODY = body_of(FALLING)
 START = to_state(BODY, *(np.array(value) for value in FALL.values()))
 
 
+@pytest.mark.ci
 @pytest.mark.slow_but("psi_s")
 @pytest.mark.parametrize("method", ["psi_s", "psi"])
 def test_the_twin_arrives_where_the_kernel_does(method):
@@ -225,6 +232,7 @@ def error(result, true):
     return max(difference(last(result), true[0]), abs(result.end_time[0] - true[1]))
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     ("method", "order", "steps"),
     chosen(
@@ -261,6 +269,7 @@ def test_an_adaptive_method_arrives_within_its_tolerance(method, true):
     assert error(lw.solve(one(FALLING, **FALL), lw.Method(method, rtol=1e-10, atol=1e-12), h=0.5, t1=2.0), true) < 1e-9
 
 
+@pytest.mark.ci
 @pytest.mark.slow_for("float32_compensated")
 @pytest.mark.parametrize("dtype", ["float32", "float32_compensated"])
 def test_single_precision_stands_at_the_event(dtype):
@@ -279,6 +288,7 @@ def test_single_precision_stands_at_the_event(dtype):
     assert floor.max() < 8.0 + 1e-4
 
 
+@pytest.mark.ci
 def test_the_first_of_two_events_in_a_step():
     # Straight paths: the floor is 1 mm nearer in time than the end of the box, or the other way round.
     for depth, east, status in ((6.0, 1.001, "floor"), (6.001, 1.0, "box")):

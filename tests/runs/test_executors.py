@@ -352,6 +352,7 @@ entry()
 """
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     "executor", ["threads", *(pytest.param(name, marks=pytest.mark.slow) for name in ("processes", "dask"))]
 )

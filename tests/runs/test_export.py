@@ -46,6 +46,7 @@ def columns(frame, name, members, samples):
     return np.swapaxes(values, 0, 1)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("kind", ["csv", "parquet"])
 @pytest.mark.parametrize("precision", ["result", "single"])
 def test_a_table_holds_the_numbers_of_the_run(kind, precision, request, tmp_path):
@@ -211,6 +212,7 @@ def content_of(path):
     return pandas.read_parquet(path).to_csv() if path.suffix == ".parquet" else path.read_bytes()
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("kind", FILES)
 def test_every_kind_of_run_gives_the_same_file(kind, stored, tmp_path):
     if kind == "mcap":
@@ -272,6 +274,7 @@ def test_members_are_chosen_by_their_index(stored, tmp_path):
             assert frame.realization.unique().tolist() == wanted, name
 
 
+@pytest.mark.ci
 def test_a_subset_keeps_its_indices(tmp_path):
     subset = lw.Ensemble(scene(origin=ORIGIN), members=9, vary={"vehicle.buoyancy": lw.distributions.Normal(std=1.0)})
     subset = subset.subset([7, 2])
@@ -282,6 +285,7 @@ def test_a_subset_keeps_its_indices(tmp_path):
         assert frame.realization.unique().tolist() == [7, 2]
 
 
+@pytest.mark.ci
 def test_members_that_were_kept_alone(tmp_path):
     save = lw.SaveAt(every=0.5)
     settings = SETTINGS | {"save": save, "keep": [4, 1]}
@@ -300,6 +304,7 @@ def test_members_that_were_kept_alone(tmp_path):
             lw.export(kept, tmp_path / "no.csv", members=[0])
 
 
+@pytest.mark.ci
 def test_a_run_without_samples_is_a_row_for_each_member(tmp_path):
     run = lw.solve(fleet(), **SETTINGS | {"keep": "none"}, statistics=[lw.statistics.Mean("depth")])
     frame = pandas.read_csv(lw.export(run, tmp_path / "run.csv"))
@@ -313,6 +318,7 @@ def test_a_run_without_samples_is_a_row_for_each_member(tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["run.csv"]
 
 
+@pytest.mark.ci
 def test_a_run_without_an_origin(tmp_path):
     run = lw.solve(fleet(scene()), **SETTINGS)
     frame = pandas.read_csv(lw.export(run, tmp_path / "run.csv"))

@@ -92,6 +92,7 @@ def results(tmp_path_factory):
     return [lw.solve(fleet(n), **SETTINGS).save(folder / f"{n}.npz") for n in (20, 30)]
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(("mode", "count"), [("refuse", 2), ("refuse", 4), ("resume", 4), ("overwrite", 4)])
 def test_runs_that_start_together(complete, tmp_path, mode, count):
     """One of them runs; the others are refused, or find it done."""
@@ -215,6 +216,7 @@ def test_without_locks_the_named_process_is_looked_for(tmp_path, monkeypatch):
         pass
 
 
+@pytest.mark.ci
 def test_two_who_save_into_one_file(results, tmp_path):
     """Each of the two, again and again: what is read meanwhile and afterwards is whole."""
     target = tmp_path / "result.npz"
@@ -329,6 +331,7 @@ def test_a_link_is_not_overwritten_but_what_it_leads_to(complete, tmp_path):
         lw.solve(fleet(), **SETTINGS, store=lw.Store(tmp_path / "run.zarr", existing="overwrite"))
 
 
+@pytest.mark.ci
 def test_a_damaged_run_may_be_overwritten(complete, tmp_path):
     for name in ("zarr.json", "created.json"):
         path = shutil.copytree(complete, tmp_path / name / "run.zarr")
@@ -347,6 +350,7 @@ def test_an_empty_folder_is_taken(complete, tmp_path):
 DEATHS = [("rename", 0, "no"), ("rename", 1, "no"), ("sync", 20, "yes"), ("remove", 0, "yes"), ("write", 3, "yes")]
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(("place", "count", "exchange"), DEATHS)
 def test_killed_while_it_overwrites(complete, tmp_path, place, count, exchange):
     """The old run is there, or the new one, which goes on; nothing is left of the other."""
@@ -398,6 +402,7 @@ FAULTS = [
 ]  # fmt: skip
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(("number", "file", "output"), FAULTS)
 def test_a_disk_that_takes_no_more(complete, tmp_path, number, file, output):
     """A line says so, what was finished is kept, and the run goes on when there is room."""

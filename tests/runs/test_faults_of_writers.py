@@ -93,6 +93,7 @@ def open_files(folder):
     return [link for link in links if link.startswith(str(folder))]
 
 
+@pytest.mark.ci
 @pytest.mark.skipif(not os.path.isdir("/dev/fd"), reason="the system lists no open files")
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("parts", [4, pytest.param(60, marks=pytest.mark.slow)])

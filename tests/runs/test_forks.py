@@ -51,6 +51,7 @@ def check(answers, way):
     assert all(answer == answers["parent"] for answer in answers[way])
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("way", [way for way in QUICK if way != "refused"])
 def test_forked_children_run_as_their_parent(quick, way):
     check(quick, way)

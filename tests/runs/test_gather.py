@@ -57,6 +57,7 @@ def assert_same(first, second):
             assert np.asarray(values).tobytes() == other.tobytes(), f"{name}: {key}"
 
 
+@pytest.mark.ci
 def test_a_result_in_memory_gives_the_bits_of_the_run(result):
     gathered = lw.gather(result, ASKED)
     assert_same(gathered, result.statistics)
@@ -65,6 +66,7 @@ def test_a_result_in_memory_gives_the_bits_of_the_run(result):
     assert_same(lw.gather(pickle.loads(pickle.dumps(result)), ASKED), result.statistics)
 
 
+@pytest.mark.ci
 def test_a_store_gives_the_bits_of_the_run(result, store):
     assert_same(lw.gather(store, ASKED), result.statistics)
     assert_same(lw.gather(lw.open_run(store), ASKED[:5]), lw.gather(result, ASKED[:5]))
@@ -85,6 +87,7 @@ def test_some_members_are_a_run_of_their_own(result, store):
     assert alone["mean depth"].value[-1, 0] == result.depth[-1, 7]
 
 
+@pytest.mark.ci
 def test_replicates_and_a_run_that_ended_early_keep_their_intervals():
     asked = [*STATISTICS, lw.statistics.Mean("speed", name="watched")]
     until = lw.Until("watched", half_width=1.0)
@@ -94,6 +97,7 @@ def test_replicates_and_a_run_that_ended_early_keep_their_intervals():
     assert result.members < 4096
 
 
+@pytest.mark.ci
 def test_what_was_not_kept_is_named():
     few = lw.solve(fleet_of(40), **SETTINGS | {"save": lw.SaveAt(fields=("position",))})
     with pytest.raises(lw.SceneError, match=r"'velocity'.*not kept. Keep it: .*fields=\('position', 'velocity'\)"):

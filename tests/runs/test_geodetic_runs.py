@@ -25,6 +25,7 @@ def scene(start, way):
     return lw.Scene.named("remus_100", environment=WATER, start=start, controller=guided(way))
 
 
+@pytest.mark.ci
 def test_a_mission_by_places_is_that_by_metres():
     there = scene({"geodetic": PLACE}, {"geodetic": WAY})
     metres = there.environment.positions(WAY)
@@ -39,6 +40,7 @@ def test_a_mission_by_places_is_that_by_metres():
     assert np.ptp(by_place.position[-1, :, :2] - by_place.position[0, :, :2]) > 1.0
 
 
+@pytest.mark.ci
 def test_members_at_places_of_their_own_are_stored_and_resumed(tmp_path):
     places = np.array(PLACE) + np.linspace(0.0, 1e-3, 600)[:, None] * [1.0, -1.0, 1000.0]
     fleet = lw.Ensemble(scene({}, {"geodetic": WAY}), sampling=lw.designs.Table({"start.geodetic": places}))

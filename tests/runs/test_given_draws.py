@@ -115,6 +115,7 @@ def test_packets_of_one_lane_differ_in_the_last_digit():
     np.testing.assert_allclose(found, expected, rtol=1e-13, atol=1e-15)
 
 
+@pytest.mark.ci
 def test_what_is_drawn_is_listed(both):
     given, drawn = both
     assert given.draws == drawn.draws
@@ -130,6 +131,7 @@ def test_what_is_drawn_is_listed(both):
     assert given.draws[3].times[-1] == pytest.approx(1.0)
 
 
+@pytest.mark.ci
 def test_what_cannot_act_is_not_listed_and_what_varies_is():
     still = lw.prepare(lw.Scene(BODY), NAMES, of="depth", method="psi_x", h=H, t1=1.0, draws="given")
     assert still.draws == ()
@@ -198,6 +200,7 @@ def test_a_sensor_measures_the_truth_with_what_is_given():
     np.testing.assert_allclose(np.moveaxis(result.samples["measured_position"], 0, 1), held, rtol=0.0, atol=1e-14)
 
 
+@pytest.mark.ci
 def test_a_current_starts_where_it_is_told():
     current = lw.terms.GaussMarkovCurrent(standard_deviation=(0.1, 0.2, 0.3), time_constant=1e9, start="stationary")
     scene = lw.Scene(BODY, terms=[lw.terms.Drag(linear=(DRAG,) * 6), current])
@@ -247,6 +250,7 @@ def test_a_law_of_a_user_takes_them_too():
 # Calls of other kinds -----------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.ci
 def test_normals_stay_with_their_members(white):
     """Many members at a time for quantities over paths, one member, a block that is not full, states, levels, a pickle."""
     given, _ = white
@@ -285,6 +289,7 @@ def test_processes_get_the_normals_of_their_members(white):
     np.testing.assert_array_equal(elsewhere(X, xi), given(X, xi))
 
 
+@pytest.mark.ci
 def test_default_members_and_seed_are_those_of_the_ensemble():
     scene = lw.Scene(BODY, terms=[lw.terms.WrenchNoise(force=STRENGTH)])
     fleet = lw.Ensemble(scene, 5, 3, {NAMES[0]: lw.distributions.Normal(std=1.0)})
@@ -297,6 +302,7 @@ def test_default_members_and_seed_are_those_of_the_ensemble():
     np.testing.assert_array_equal(lw.uq.draws_of(drawn), xi)
 
 
+@pytest.mark.ci
 def test_a_failed_member_fails_alone(white):
     given, _ = white
     mild = lw.prepare(

@@ -14,6 +14,8 @@ import lgvi_warp as lw
 from lgvi_warp.results import member_fields
 from tests.laws.cases import CASES
 
+pytestmark = pytest.mark.ci
+
 EXAMPLES = Path(__file__).parents[2] / "examples" / "scenes"
 PIECES = 10
 STEPS = 0.02

@@ -205,6 +205,7 @@ def special(folder):
 
 
 # A few of each kind in the quick tests: the doors are the same for all.
+@pytest.mark.ci
 @pytest.mark.slow_but(
     "store: created names an*", "store: marker names an abs*", "store: a chunk is a*", "store: an array is a link*",
     "store: kept is a link*", "store: the root is a*", "store: the root has 50*", "store: codec p*",
@@ -551,6 +552,7 @@ def the_cell(folder):
     return path
 
 
+@pytest.mark.ci
 @pytest.mark.slow_but("torn at 0.5", "a status nobody*", "numbers of NaN", "other messages", "73 TiB", "words nested*")
 @pytest.mark.parametrize("name", hostile.CELLS)
 def test_a_damaged_cell_runs_anew(name, swept, home, capsys):

@@ -50,6 +50,7 @@ def copy(complete, tmp_path):
     return shutil.copytree(complete, tmp_path / "run.zarr")
 
 
+@pytest.mark.ci
 def test_it_has_the_bits_of_a_run_in_memory(complete, memory):
     failed = np.flatnonzero(memory.status)
     assert 256 < len(failed) < 512
@@ -84,6 +85,7 @@ def test_xarray_opens_the_group_alone_and_with_the_run(complete, memory, recwarn
     assert len(recwarn) == 0
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("executor", [pytest.param("processes", marks=pytest.mark.slow), "threads"])
 def test_the_same_run_leaves_the_same_bytes(executor, complete, tmp_path):
     path = tmp_path / "run.zarr"
@@ -123,6 +125,7 @@ DAMAGED = (("kept/position/c.0.1.0", flipped, "has changed"), ("kept/attitude/c.
            ("kept/zarr.json", torn(0.99), "is damaged"), ("kept", shutil.rmtree, "is missing"))  # fmt: skip
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(("name", "harm", "word"), DAMAGED, ids=[f"{h.__name__} {n}" for n, h, _ in DAMAGED])
 def test_damage_is_seen_and_mended(copy, complete, name, harm, word, capsys):
     harm(copy / name, None)
@@ -135,6 +138,7 @@ def test_damage_is_seen_and_mended(copy, complete, name, harm, word, capsys):
     assert cli.main(["info", str(copy)]) == 0
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     ("harm", "output"),
     [
@@ -166,6 +170,7 @@ def interrupted(path, complete):
     return path
 
 
+@pytest.mark.ci
 def test_a_run_is_complete_only_with_them(complete, tmp_path, capsys):
     path = interrupted(tmp_path / "run.zarr", complete)
     with pytest.raises(lw.SceneError, match=r"members that it keeps have not been run again yet.*resume"):
@@ -179,6 +184,7 @@ def test_a_run_is_complete_only_with_them(complete, tmp_path, capsys):
     assert result.kept.members == len(result.kept_members)
 
 
+@pytest.mark.ci
 def test_other_members_than_those_that_failed_are_run_anew(complete, tmp_path):
     path = interrupted(tmp_path / "run.zarr", complete)
     other = lw.solve(failing(), **SETTINGS, keep=[3, 5], store=tmp_path / "other.zarr")
@@ -192,6 +198,7 @@ def kept_run(path):
     lw.solve(failing(), **SETTINGS, keep="failed", threads=1, store=lw.Store(path, chunk_bytes=20_000))
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("wanted", ["zarr.json", pytest.param("blocks/000000000.json", marks=pytest.mark.slow)])
 def test_killed_among_its_kept_members(wanted, tmp_path):
     path, other = tmp_path / "run.zarr", tmp_path / "other.zarr"
@@ -206,6 +213,7 @@ def test_killed_among_its_kept_members(wanted, tmp_path):
     assert differing(other, path) == []
 
 
+@pytest.mark.ci
 def test_with_statistics_until_and_fewer_fields(tmp_path):
     own = {
         "statistics": [lw.statistics.Mean("depth")],
@@ -242,6 +250,7 @@ def test_members_that_share_their_steps_lie_beside_those_that_are_kept(tmp_path)
         assert one.kept.provenance["ensemble"]["indices"] == [5, 6, 29]
 
 
+@pytest.mark.ci
 def test_parts_are_merged_with_their_kept_members(complete, tmp_path):
     for name, only in (("a", range(0, 2)), ("b", range(2, 4))):
         lw.solve(failing(), **SETTINGS, keep="failed", store=tmp_path / name / "run.zarr", blocks=only)
@@ -261,6 +270,7 @@ def test_the_last_part_into_one_folder_runs_them(complete, tmp_path):
     assert differing(complete, path) == []
 
 
+@pytest.mark.ci
 def test_all_are_told_with_exit_code_and_files(tmp_path, capsys):
     """on_failure="raise" ends with 1, and what failed lies in the store."""
     fast = ["--set", "start.angular_velocity=[0,0,500]", "--keep", "failed", "--on-failure", "raise"]

@@ -114,6 +114,7 @@ DAMAGES = [truncated, emptied, flipped, without_code, without_sums, torn_sums, s
            a_file_for_a_folder]  # fmt: skip
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("damage", DAMAGES, ids=lambda damage: damage.__name__)
 def test_what_is_damaged_is_compiled_anew(cache, damage):
     assert works()
@@ -129,6 +130,7 @@ def test_what_is_damaged_is_compiled_anew(cache, damage):
     )
 
 
+@pytest.mark.ci
 def test_phases(cache):
     begun = time.perf_counter()
     phases = kernel_cache.load(MODULE)
@@ -172,6 +174,7 @@ def headers_while_it_compiles():
     return len(found)
 
 
+@pytest.mark.ci
 def test_a_precompiled_header_serves_the_next_process(header, capfd):
     assert headers_while_it_compiles() == 1
     assert capfd.readouterr() == ("", "")
@@ -203,6 +206,7 @@ def test_functions_for_gradients_of_structs_are_private(cache):
     assert kernel_cache.codegen.struct_template is template
 
 
+@pytest.mark.ci
 def test_what_is_whole_is_not_compiled(cache):
     assert works()
     written = only(cache, ".o").stat().st_mtime_ns
@@ -211,6 +215,7 @@ def test_what_is_whole_is_not_compiled(cache):
     assert only(cache, ".o").stat().st_mtime_ns == written
 
 
+@pytest.mark.ci
 def test_code_of_other_processors_stays(cache):
     assert works()
     other = only(cache, ".o").with_name("other.cpu12345678.o")
@@ -222,6 +227,7 @@ def test_code_of_other_processors_stays(cache):
     assert other.read_bytes() == b"code"
 
 
+@pytest.mark.ci
 def test_a_full_disk_is_told_before_llvm_ends_the_process(cache):
     no_room = r"has no room for a new kernel.*WARP_CACHE_PATH"
     with files_of_at_most(100_000), pytest.raises(OSError, match=no_room) as caught:
@@ -270,6 +276,7 @@ def test_a_cache_that_is_only_read_serves_what_it_has(cache):
     assert works()
 
 
+@pytest.mark.ci
 def test_a_temporary_folder_without_room_is_not_needed(cache, monkeypatch, capfd):
     """Clang writes its precompiled header there, and would say on stderr that it cannot."""
     folders = warp_setup.header_folders()
@@ -295,6 +302,7 @@ def test_the_temporary_folder_is_looked_at(tmp_path, monkeypatch):
     assert not kernel_cache.temporary_room()
 
 
+@pytest.mark.ci
 def test_what_killed_processes_left_is_swept(cache):
     assert works()
     name = only(cache, ".o").parent.name
@@ -314,6 +322,7 @@ def test_what_killed_processes_left_is_swept(cache):
     assert not alive.exists()
 
 
+@pytest.mark.ci
 def test_threads_compile_once(cache):
     compiled = mock.Mock(side_effect=kernel_cache.compile_module)
     load = functools.partial(kernel_cache.load, MODULE, compiled_by=compiled)

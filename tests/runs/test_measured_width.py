@@ -50,6 +50,7 @@ def test_a_width_that_was_asked_for_and_steps_that_are_chosen_stay(measured_widt
     assert clock.readings == 0
 
 
+@pytest.mark.ci
 def test_a_long_run_measures_two_widths_and_later_runs_know(measured_widths):
     plan = plan_of(members=2_000_000)
     # 16 million vehicle-steps of 10 us, on each width alike: the width stays, and is known to be measured.
@@ -61,6 +62,7 @@ def test_a_long_run_measures_two_widths_and_later_runs_know(measured_widths):
     assert clock.readings == 0
 
 
+@pytest.mark.ci
 def test_a_run_goes_on_where_its_width_cannot_be_kept(measured_widths):
     measured_widths.mkdir()  # a file cannot stand here
     try:
@@ -70,6 +72,7 @@ def test_a_run_goes_on_where_its_width_cannot_be_kept(measured_widths):
         measured_widths.rmdir()
 
 
+@pytest.mark.ci
 def test_the_faster_width_is_taken(measured_widths):
     plan = plan_of()
     (one,), (two,) = candidates(plan, (1,)), candidates(plan, (2,))

@@ -27,6 +27,7 @@ OF = [lw.metrics.IAE("heading"), "itae heading", {"type": "settling_time", "of":
       "max(position[0])", "outcome ok"]  # fmt: skip
 
 
+@pytest.mark.ci
 def test_metrics_stand_beside_quantities(idle):
     """The error is w all the time: its integral w T, with the time w T^2 / 2; it never settles, or at once where w = 0."""
     run = lw.prepare(idle, ["set_point.heading"], of=OF, save=lw.SaveAt(every=2 * H), **SETTINGS)
@@ -50,11 +51,13 @@ def test_metrics_stand_beside_quantities(idle):
     np.testing.assert_allclose(outputs.values[:, 0], 0.5 * T, rtol=1e-12)
 
 
+@pytest.mark.ci
 def test_a_metric_of_samples_has_those_of_every_tick(idle):
     run = lw.prepare(idle, ["set_point.heading"], of=lw.statistics.PathMean("position[0]"), **SETTINGS)
     np.testing.assert_allclose(run(WANTED[:, None]), SPEED * T / 2.0, rtol=1e-12)
 
 
+@pytest.mark.ci
 def test_a_member_that_fails_has_no_metric(idle):
     state = [np.zeros((2, 3)), np.tile(np.eye(3), (2, 1, 1)), np.zeros((2, 3)), np.zeros((2, 3))]
     state[2][1, 0] = np.nan

@@ -124,6 +124,7 @@ def by_twin(paths, limit):
     return expected
 
 
+@pytest.mark.ci
 def test_metrics_are_the_twins(fleet, paths):
     limit = next(term.limit for term in fleet.scene.terms if term.key == "control_fins")
     expected = by_twin(paths, limit)
@@ -141,6 +142,7 @@ def test_metrics_are_the_twins(fleet, paths):
     assert paths.statistics["mean iae depth"].value[0, 0] == pytest.approx(finite.mean(), rel=1e-12)
 
 
+@pytest.mark.ci
 def test_ticks_do_not_depend_on_what_is_kept(coarse, paths):
     assert coarse.time.tolist() == [0.0, 4.0, 8.0, 12.0]
     assert coarse.position.tobytes() == np.ascontiguousarray(paths.position[::40]).tobytes()
@@ -148,6 +150,7 @@ def test_ticks_do_not_depend_on_what_is_kept(coarse, paths):
         assert estimate.value.tobytes() == coarse.statistics[name].value.tobytes(), name
 
 
+@pytest.mark.ci
 def test_other_statistics_are_of_the_samples_that_are_kept(fleet, coarse):
     asked = [lw.statistics.Mean("depth"), lw.statistics.PathMaximum("depth"), *metrics()]
     both = lw.solve(fleet, **COARSE, keep="none", statistics=asked)
@@ -157,6 +160,7 @@ def test_other_statistics_are_of_the_samples_that_are_kept(fleet, coarse):
     assert both.statistics["mean iae depth"].value == coarse.statistics["mean iae depth"].value
 
 
+@pytest.mark.ci
 def test_a_store_that_goes_on_has_the_same_numbers(fleet, coarse, tmp_path):
     asked = [
         lw.metrics.Overshoot("depth", then=[lw.statistics.Mean(), lw.statistics.MemberValues()]),
@@ -179,6 +183,7 @@ def stop(share):
         raise RuntimeError("enough")
 
 
+@pytest.mark.ci
 def test_predict_and_prepare_take_ticks(fleet):
     assert lw.predict(fleet, t1=T1, statistics=metrics(), keep="none").memory > 0
 
@@ -189,6 +194,7 @@ def test_a_scene_without_a_controller_is_told(fleet):
         lw.solve(scene, statistics=[lw.metrics.IAE("depth")])
 
 
+@pytest.mark.ci
 def test_numbers_do_not_depend_on_how_many_ticks_are_gathered_at_once(fleet, coarse, monkeypatch):
     monkeypatch.setattr(launches, "GATHERED_BYTES", 1)
     monkeypatch.setattr(work, "NUMBERS_AT_ONCE", 1)
@@ -198,6 +204,7 @@ def test_numbers_do_not_depend_on_how_many_ticks_are_gathered_at_once(fleet, coa
         assert estimate.value.tobytes() == by_tick.statistics[name].value.tobytes(), name
 
 
+@pytest.mark.ci
 def test_so_it_is_where_members_fill_no_packet(fleet, monkeypatch):
     # Three members take the memory of a whole packet: what is held there at once is counted for it, and for them alike.
     few = lw.Ensemble(fleet.scene, 3, seed=1, vary=fleet.vary)
@@ -208,6 +215,7 @@ def test_so_it_is_where_members_fill_no_packet(fleet, monkeypatch):
     assert lw.solve(few, **settings).statistics["each iae depth"].value.tobytes() == at_once.tobytes()
 
 
+@pytest.mark.ci
 def test_metrics_change_no_bit_of_the_run(fleet, coarse):
     # The same kernel, which gathers nothing.
     fields = ("position", "reference_heading", "actuator", "demand")
@@ -251,6 +259,7 @@ def test_metrics_of_what_no_guidance_wants_are_refused(fleet):
             )
 
 
+@pytest.mark.ci
 @pytest.mark.slow_for("float32_compensated")
 @pytest.mark.parametrize("dtype", ["float64", "float32_compensated"])
 def test_numbers_do_not_depend_on_what_else_is_read_at_ticks(dtype, fleet, coarse):
@@ -278,6 +287,7 @@ def test_a_tick_gathers_only_the_numbers_that_are_read(fleet):
     assert gathered(lw.metrics.IAE("depth"), lw.metrics.MaxError("position"))["position"] == 3
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("keep", ["none", "all"])
 def test_a_metric_may_read_nothing_at_ticks(keep, fleet, coarse):
     alone = lw.solve(fleet, **COARSE, statistics=[lw.metrics.TimeToFailure()], keep=keep)

@@ -33,6 +33,7 @@ def solved(members, t1, **more):
     return lw.solve(members, "psi_s", h=H, t1=t1, **{"save": lw.SaveAt(every=T), **more})
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("name", WAYS)
 @pytest.mark.slow_but("stop")
 def test_a_member_ends_at_the_tick_of_the_twin(name):
@@ -53,6 +54,7 @@ def test_a_member_ends_at_the_tick_of_the_twin(name):
         assert np.abs(result.attitude[-1, i] - R[last]).max() < 1e-9
 
 
+@pytest.mark.ci
 @pytest.mark.slow_for("float32")
 @pytest.mark.parametrize("dtype", ["float64", "float32"])
 def test_until_then_it_is_the_run_without_the_event(dtype):
@@ -66,6 +68,7 @@ def test_until_then_it_is_the_run_without_the_event(dtype):
         assert np.ptp(with_event.position[~rows, i], axis=0).max() == 0.0
 
 
+@pytest.mark.ci
 @pytest.mark.slow_for("after")
 @pytest.mark.parametrize("place", [0, 1], ids=["before", "after"])
 def test_the_first_of_two_events_counts_also_within_a_step_that_ends_at_the_last_tick(place):
@@ -78,6 +81,7 @@ def test_the_first_of_two_events_counts_also_within_a_step_that_ends_at_the_last
         np.testing.assert_allclose(result.end_time, end + min(off, 0.0), rtol=0.0, atol=1e-12)
 
 
+@pytest.mark.ci
 def test_it_is_an_outcome_with_its_time_and_energy():
     ends = lw.statistics.EndTime("mission_done", then=[lw.statistics.Mean()])
     asked = [lw.statistics.Outcome("mission_done"), ends]
@@ -93,6 +97,7 @@ def test_it_is_an_outcome_with_its_time_and_energy():
     np.testing.assert_allclose(used.energy_used[-1], 12.0 * used.end_time, rtol=1e-12)
 
 
+@pytest.mark.ci
 def test_a_run_in_two_parts_and_in_a_store_ends_at_the_same_tick(tmp_path):
     members, whole = fleet(), solved(fleet(), 60.0)
     # One part ends between two ticks, one at the very tick of the first member's end, which the next part notices.

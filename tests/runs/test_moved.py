@@ -65,22 +65,26 @@ def check(store, tmp_path):
     assert differing(store, tmp_path / "whole.zarr") == []
 
 
+@pytest.mark.ci
 def test_the_folder_was_moved(project, tmp_path):
     check(elsewhere(project) / "runs" / "run.zarr", tmp_path)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("change", [lambda path: path.unlink(), lambda path: written(path, 1)], ids=["gone", "changed"])
 def test_the_store_has_the_numbers(project, tmp_path, change):
     change(project / "data" / "members.csv")
     check(project / "runs" / "run.zarr", tmp_path)
 
 
+@pytest.mark.ci
 def test_an_older_run_finds_its_table_by_its_checksum(older):
     there = elsewhere(older)
     written(there / "runs" / "members.csv", 1)
     assert lw.resume(there / "runs" / "run.zarr").members == MEMBERS
 
 
+@pytest.mark.ci
 def test_an_older_run_without_its_table_names_it(older):
     there = elsewhere(older)
     written(there / "data" / "members.csv", 1)
@@ -88,6 +92,7 @@ def test_an_older_run_without_its_table_names_it(older):
         lw.resume(there / "runs" / "run.zarr")
 
 
+@pytest.mark.ci
 def test_the_same_run_is_told_by_the_tables_checksum(project, tmp_path):
     there = elsewhere(project)
     store = lw.Store(there / "runs" / "run.zarr", existing="resume")

@@ -28,6 +28,7 @@ def noisy():
     return lw.Scene(BODY, terms=terms, controller=controller)
 
 
+@pytest.mark.ci
 def test_rows_have_the_noise_of_the_members_that_are_named(noisy):
     """All draws: of forces, of the current and of sensors. To the bit, in any order, twice the same, in one row or in many."""
     vary = {"start.velocity[2]": lw.distributions.Normal(mean=0.2, std=0.1)}
@@ -58,6 +59,7 @@ def test_a_seed_beside_levels_is_that_of_the_noise_alone():
     np.testing.assert_array_equal(run(X), run(X, seed=9, indices=[5, 6, 7, 8, 2]))
 
 
+@pytest.mark.ci
 def test_common_noise_is_that_of_member_0_of_the_seed(prepared):
     common = lw.prepare(scene(), NAMES, of="position[2]", common_noise=True, method="psi_x", h=H, t1=T)
     X = np.zeros((5, 2))
@@ -77,6 +79,7 @@ def test_noise_that_is_asked_for_wrongly_is_refused(prepared, more, words):
         prepared(**{"X": np.zeros((3, 2)), **more})
 
 
+@pytest.mark.ci
 def test_a_model_for_other_libraries_takes_them_too(prepared):
     f = lw.uq.model(scene(), NAMES, "position[2]", method="psi_x", h=H, t1=T)
     X, noise = np.zeros((3, 2)), dict(seed=5, indices=[4, 4, 1])
@@ -172,6 +175,7 @@ def by_row(run, u, index):
     return run((u * STD).reshape(-1, 2)).reshape(index.shape)
 
 
+@pytest.mark.ci
 def test_the_depth_is_the_normal_one(prepared):
     """Its variance, from 40,000 members: the error of that of normals is sqrt(2 / 40,000), 0.7 %."""
     u = np.random.default_rng(0).normal(size=(40_000, 2))
@@ -182,6 +186,7 @@ def test_the_depth_is_the_normal_one(prepared):
     assert stats.kstest(y / np.sqrt(5.0 * BY_FORCE), "norm").pvalue > 1e-3
 
 
+@pytest.mark.ci
 def test_a_chain_finds_a_rare_event_by_indices_and_not_by_rows(prepared):
     held, value = within(keyed(prepared, 0))
     assert held

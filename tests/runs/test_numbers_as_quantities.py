@@ -51,6 +51,7 @@ def test_means_are_those_of_what_was_drawn(fleet, tmp_path, kept):
     np.testing.assert_allclose(found.mean[3], (drawn(fleet)[1] - ends).mean(), rtol=1e-12, atol=1e-12)
 
 
+@pytest.mark.ci
 def test_an_estimate_and_a_probability_follow_the_normal_distribution(fleet):
     weight = lw.Scene.named("remus_100").parameters()["vehicle.buoyancy"]
     far = NormalDist(float(weight), 1.0)
@@ -65,6 +66,7 @@ def test_a_derivative_by_itself_is_one(fleet):
     np.testing.assert_allclose(found.jacobian, 1.0, rtol=1e-9)
 
 
+@pytest.mark.ci
 def test_a_set_point_is_taken_from_a_depth():
     scene = lw.Scene.load("example:remus_100_autopilot")
     fleet = lw.Ensemble(scene, members=20, vary={"set_point.depth": lw.distributions.Uniform(5.0, 8.0)})

@@ -47,6 +47,7 @@ def agree(result, members):
     return floor
 
 
+@pytest.mark.ci
 def test_counts_agree():
     result = lw.solve(fleet(2000), **SETTINGS)
     floor = agree(result, 2000)
@@ -68,6 +69,7 @@ def test_counts_agree_of_100_000():
     agree(lw.solve(fleet(100_000), **SETTINGS, keep="none"), 100_000)
 
 
+@pytest.mark.ci
 def test_in_a_store_and_after_a_resume(tmp_path, monkeypatch):
     monkeypatch.setitem(events.TYPES, FarAway.type, FarAway)
     members, whole = fleet(1000), lw.solve(fleet(1000), **SETTINGS)
@@ -97,6 +99,7 @@ def test_processes_give_the_same(tmp_path):
         assert all(one[key].tobytes() == apart.statistics[name][key].tobytes() for key in one.arrays)
 
 
+@pytest.mark.ci
 def test_several_events_by_their_names():
     surface, floor, *others = stops(surface=17.0, floor=26.0)
     ends = [surface, dataclasses.replace(floor, name="sea floor"), *others]
@@ -111,6 +114,7 @@ def test_several_events_by_their_names():
     assert s["mean depth at surface"].value[0, 0] == pytest.approx(17.0, abs=1e-12)
 
 
+@pytest.mark.ci
 def test_an_own_monte_carlo_with_three_competing_events():
     """An upright vehicle moves up or down at constant acceleration to the surface or the floor, unless its time is over first.
 
@@ -184,6 +188,7 @@ TEN = {
 }  # fmt: skip
 
 
+@pytest.mark.ci
 @pytest.mark.slow_for("remus_100-*", "bluerov2_dead_thruster-*")
 @pytest.mark.parametrize("stored", [False, True], ids=["memory", "store"])
 @pytest.mark.parametrize("name", TEN)
@@ -213,6 +218,7 @@ def test_the_sum_over_outcomes_and_ok_is_1_over_ten_scenes(name, stored, monkeyp
     assert (n < 4000) == (one.members < 4000 or name == "until")
 
 
+@pytest.mark.ci
 def test_replicates_of_a_design():
     result = lw.solve(fleet(512, sampling=lw.designs.Sobol(replicates=4)), **SETTINGS)
     hits = (np.asarray(result.status) == lw.Status.FLOOR).sum()
@@ -220,6 +226,7 @@ def test_replicates_of_a_design():
         assert round(float(np.ravel(result.statistics[name].value)[-1]) * 512) == hits
 
 
+@pytest.mark.ci
 def test_quantities_of_outcomes_and_times():
     members = fleet(300, stops(floor=26.0, surface=17.0))
     result = lw.solve(members, **SETTINGS)
@@ -300,6 +307,7 @@ def test_an_outcome_that_no_member_can_have_is_refused():
     says(text, "outcome.of = 'surface' is not an outcome of this scene", "Did you mean 'floor'")
 
 
+@pytest.mark.ci
 def test_until_an_outcome_is_sure_enough():
     asked = SETTINGS | {"statistics": [Outcome("floor"), EndTime("floor", Mean())]}
     for watched, half in (("outcome floor", 0.03), ("mean end_time floor", 1.0)):

@@ -116,6 +116,7 @@ def test_a_sample_at_the_last_good_step_counts():
     assert status.under_way(few).tolist() == [[True, True], [True, False], [False, False]]
 
 
+@pytest.mark.ci
 def test_the_first_in_time_is_named(mixed):
     assert outcomes.outcome_text(mixed, Status.FLOOR).startswith(
         "floor, 3 of 7 members (first: member 0 at 3 s): stopped"
@@ -138,6 +139,7 @@ def test_the_fan_is_of_those_under_way(mixed):
     assert texts(depth)[0] == "under way: 7 at 0 s,\n2 at 20 s"
 
 
+@pytest.mark.ci
 def test_the_fan_ends_where_all_have(sunk):
     depth = drawn(sunk)[0]["Depth"]
     median = next(line for line in depth.lines if line.get_label() == "median").get_ydata()
@@ -271,6 +273,7 @@ def entry_of(path):
     return RrdReader(path).recordings()[0]
 
 
+@pytest.mark.ci
 def test_every_run_has_ids_of_its_own(mixed, sunk, tmp_path):
     again = lw.solve(divers(SPEEDS), h=0.1, t1=20.0, save=lw.SaveAt(every=1.0))
     part = mixed.part(np.array([0, 1]))
@@ -312,6 +315,7 @@ def test_a_recording_shows_each_member_by_its_outcome_from_then_on(mixed, tmp_pa
     assert all(np.isfinite(pose).all() for frames in seen.values() for pose in frames.values())
 
 
+@pytest.mark.ci
 def test_a_stored_run_is_recorded_in_pieces_as_one_in_memory(mixed, tmp_path, monkeypatch):
     from lgvi_warp.views import choice
 
@@ -331,6 +335,7 @@ def test_a_stored_run_is_recorded_in_pieces_as_one_in_memory(mixed, tmp_path, mo
     assert [entry_of(lw.record(stored, tmp_path / "2.rrd")).recording_id] == [entry_of(paths[1]).recording_id]
 
 
+@pytest.mark.ci
 def test_statistics_of_all_make_the_fan_where_few_members_were_kept(mixed):
     from lgvi_warp.views.drawn import LEVELS, drawn_of
 
@@ -387,6 +392,7 @@ def run(scene_file, capsys, *options):
     return code, said.out, said.err
 
 
+@pytest.mark.ci
 def test_a_run_that_all_sink_exits_with_0_and_has_its_pictures(scene_file, capsys):
     code, said, errors = run(scene_file, capsys)
     assert code == 0
@@ -427,6 +433,7 @@ def test_the_summary_says_work_where_forces_do_some(mixed):
     assert report.energy_lines(lost, lost) == []
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(("absent", "files", "words"), [
     (["matplotlib"], ["fleet.rrd", "result.npz"], "fleet.png: not made without matplotlib. "),
     (["rerun"], ["fleet.png", "result.npz"], "fleet.rrd: not made without rerun-sdk. "),

@@ -69,6 +69,7 @@ def test_shape_of_mass():
     assert shape_of_mass((np.eye(3) + 0.1)[None]) == "full"
 
 
+@pytest.mark.ci
 def test_a_second_solve_builds_no_kernel():
     scene = scene_of(net=1.0)
     lw.solve(one(scene), h=0.01, t1=0.1)
@@ -220,6 +221,7 @@ def test_method_is_data():
         assert stages == stages[::-1]
 
 
+@pytest.mark.ci
 @pytest.mark.slow_for("cayley*")
 @pytest.mark.parametrize(("solver", "h", "n"), [("quartic", 1e-4, 0), ("quartic", 0.01, 1), ("cayley", 0.1, 2)])
 def test_as_many_newton_steps_as_the_start_needs(scene, solver, h, n):

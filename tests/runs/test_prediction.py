@@ -116,6 +116,7 @@ def test_statistics_without_samples_take_little(tmp_path):
     assert found.disk == pytest.approx(sum(map(len, tree(path).values())), rel=0.02)
 
 
+@pytest.mark.ci
 def test_statistics_and_kept_members_are_counted(tmp_path):
     own = {"statistics": STATISTICS, "keep": range(0, 1003, 5)}
     path = tmp_path / "run.zarr"

@@ -195,6 +195,7 @@ def test_whole_numbers_are_refused_with_the_name_of_an_entry(paper):
         lw.Ensemble(scene, 1, 0, {entry: Uniform(1.0, 2.0)})
 
 
+@pytest.mark.ci
 def test_other_members_may_need_another_kernel():
     """A term that no member feels is in no kernel, and an isotropic mass matrix has code of its own."""
     scene = lw.Scene(lw.Vehicle(mass=10.0, added_mass=[0.0, 0.0, 0.0], inertia=[1.0, 2.0, 3.0]),
@@ -244,6 +245,7 @@ def test_nothing_of_the_call_before_is_left(paper, members):
     np.testing.assert_array_equal(run(sound), solved(paper, NAMES, sound, **SETTINGS).position[-1])
 
 
+@pytest.mark.ci
 def test_a_zero_of_another_sign_is_another_number():
     scene = lw.Scene.named("sphere", terms=[Current(velocity=[0.0, 0.0, 0.0])])
     run = lw.prepare(scene, ["current.velocity[0]"], of=lambda end: end.parameters["current.velocity"][:, 0], **SHORT)
@@ -267,6 +269,7 @@ def test_a_mass_whose_square_is_no_number_gives_no_warning_of_numpy():
     make_plan(lw.Ensemble(scene, None, 0, None, Table(values={"vehicle.mass": [1e160]})), "psi_x", **SHORT)
 
 
+@pytest.mark.ci
 def test_noise_of_a_call_is_its_own():
     noise = WrenchNoise(force=(1.0, 0.0, 0.0))
     scene = lw.Scene(lw.Vehicle(mass=10.0, added_mass=[0.0, 1.0, 2.0], inertia=[1.0, 2.0, 3.0]), terms=[noise])
@@ -397,6 +400,7 @@ PUSHING = {
 }  # fmt: skip
 
 
+@pytest.mark.ci
 def test_laws_remember_nothing_of_the_call_before():
     scene = lw.Scene.named("sphere", terms=[Thrusters(**PUSHING)])
     names = ["start.velocity[0]", "thrusters.coefficient[0]"]
@@ -425,6 +429,7 @@ def test_packets_take_members_whose_laws_have_other_rows(columns):
         assert arrays(packets) == arrays(Packets(plan, members))
 
 
+@pytest.mark.ci
 def test_packets_take_members_whose_commands_reach_their_limits():
     # Commands are cut on the host: a block has as many pieces as its members need.
     vehicle = lw.Vehicle(mass=10.0, added_mass=[1.0, 2.0, 3.0], inertia=[1.0, 2.0, 2.5])
@@ -471,6 +476,7 @@ def drifting():
     return late(scene, 600, 500, {"current.velocity": [0.5, 0.0, 0.0]})
 
 
+@pytest.mark.ci
 def test_a_late_member_that_needs_more_starts_the_run_anew(surveyed, drifting):
     result = lw.solve(drifting, threads=1, **SHORT)
     whole = make_plan(drifting, **SHORT)
@@ -482,12 +488,14 @@ def test_a_late_member_that_needs_more_starts_the_run_anew(surveyed, drifting):
     np.testing.assert_array_equal(kept.position, expected[:, [3, 500]])
 
 
+@pytest.mark.ci
 def test_a_prepared_run_begins_anew_and_says_what_ran(surveyed, drifting):
     result = lw.prepare(drifting, threads=1, **SHORT)()
     np.testing.assert_array_equal(result.position, lw.solve(drifting, threads=1, **SHORT).position)
     assert "current" in result.provenance["terms"]
 
 
+@pytest.mark.ci
 def test_a_late_member_that_needs_more_is_predicted(surveyed, drifting, monkeypatch):
     monkeypatch.setattr(predict, "TRIAL_SECONDS", 1e-3)
     assert lw.predict(drifting, threads=3, **SHORT).members == 600
@@ -500,6 +508,7 @@ class Ahead:
         yield from [(block, work(block)) for block in blocks]
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("values", [{"vehicle.mass": -1.0}, {"current.velocity": [0.5, 0.0, 0.0]}])
 def test_a_late_member_that_the_run_does_not_need_changes_nothing(surveyed, drifting, values):
     fleet = late(drifting.scene, 2000, 1900, values)

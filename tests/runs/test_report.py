@@ -50,6 +50,7 @@ class Page(HTMLParser):
         assert self.open.pop() == tag
 
 
+@pytest.mark.ci
 def test_of_a_run(result, tmp_path):
     path = lw.report(result, tmp_path / "report.html")
     text = path.read_text(encoding="utf-8")
@@ -109,6 +110,7 @@ def test_what_is_no_run(tmp_path, capsys):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.ci
 def test_names_are_text(result, tmp_path):
     evil = lw.Scene.from_dict(result.provenance["scene"] | {"terms": []})
     few = lw.solve(evil, h=0.02, t1=0.04)

@@ -74,6 +74,7 @@ def goes_on(path, complete, members=4096):
     shutil.rmtree(path)
 
 
+@pytest.mark.ci
 def test_three_kills(short, tmp_path):
     path, dice = tmp_path / "run.zarr", random.Random(3)
     for blocks in (1, 2, 4):

@@ -111,6 +111,7 @@ def test_laws_with_rows_that_members_share(laws, dtype):
     assert same(*(lw.solve(fleet, **settings) for fleet in (shared, varied)))
 
 
+@pytest.mark.ci
 def test_what_is_known_of_a_scene_changes_no_bit():
     """A scene that has run, by other methods, steps and members, gives the bits of one that never did."""
 
@@ -140,6 +141,7 @@ def test_what_is_known_of_a_scene_changes_no_bit():
             assert solved(known, *run) == solved(made(), *run), run
 
 
+@pytest.mark.ci
 def test_what_is_known_of_a_scene_goes_with_it():
     scene = lw.Scene.named("remus_100", start=lw.Start(velocity=[1.5, 0.0, 0.0]))
     fleet = lw.Ensemble(scene, 3, 1, {"vehicle.buoyancy": lw.distributions.Normal(std=1.0)})

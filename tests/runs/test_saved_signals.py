@@ -76,6 +76,7 @@ def test_there_are_twelve():
     assert len(SCENES) >= 12
 
 
+@pytest.mark.ci
 @pytest.mark.slow_but("float32")
 @pytest.mark.parametrize("name", SCENES)
 def test_a_motion_does_not_depend_on_what_is_saved(name):

@@ -50,6 +50,7 @@ def test_a_tilted_plane_is_met_where_geometry_says():
     np.testing.assert_allclose(r.velocity[-1], v, rtol=1e-12)
 
 
+@pytest.mark.ci
 def test_a_twist_within_a_cell_is_met_exactly():
     # 20 + t x y is bilinear in each cell, and quadratic along a straight run.
     twist = 2e-3
@@ -190,6 +191,7 @@ def test_a_ridge_that_one_step_leaps_over_is_not_seen_and_half_the_step_sees_it(
     assert ends == {4.0 * 36 / 37: {"ok": 1}, 1.0: {"floor": 1}}
 
 
+@pytest.mark.ci
 def test_a_run_in_two_pieces_has_the_bits_of_one():
     b, v = runs(16)
     fleet = one(scene(grid_of(lambda x, y: 20.0 + 2e-3 * x * y)), b=b, nu=v)
@@ -228,6 +230,7 @@ def test_a_scene_keeps_its_floor_in_tables():
         np.testing.assert_array_equal(getattr(again, name), value)
 
 
+@pytest.mark.ci
 def test_the_altitude_is_a_quantity_everywhere():
     b, v = runs(12)
     hills_floor, flat = grid_of(lambda x, y: 20.0 + 0.1 * x), lw.events.Floor(depth=19.0, name="flat", clearance=-50.0)
@@ -253,11 +256,13 @@ def test_the_altitude_is_a_quantity_everywhere():
     np.testing.assert_array_equal(later["mean altitude"].value[-1], r.statistics["mean altitude"].value[-1])
 
 
+@pytest.mark.ci
 def test_the_altitude_needs_a_floor():
     with pytest.raises(lw.SceneError, match=r"of = 'altitude' needs a floor. Give the scene one"):
         lw.solve(scene(), "rk4", h=0.5, t1=1.0, statistics=[lw.statistics.Mean("altitude")])
 
 
+@pytest.mark.ci
 def test_how_near_members_came_to_the_hills():
     # Level runs over waves of the floor: the least distance is that of the nodes on the way and between them.
     floor = grid_of(lambda x, y: 20.0 + 2.0 * np.sin(x / 7.0), [np.arange(-10.0, 80.0, 2.0), np.array([-50.0, 50.0])])

@@ -461,6 +461,7 @@ def test_twice_while_files_are_written_names_what_is_there(tmp_path):
     assert line.rsplit("/", 1)[1] in there
 
 
+@pytest.mark.ci
 def test_an_interrupt_while_files_are_written_leaves_them_whole(tmp_path, monkeypatch, capsys):
     from lgvi_warp import plots
 
@@ -509,6 +510,7 @@ def test_lasting_streams():
     assert not Lasting(None).isatty()
 
 
+@pytest.mark.ci
 def test_stores_of_one_interrupted_run_are_those_of_one_that_was_not(tmp_path):
     with pytest.raises(KeyboardInterrupt):
         lw.solve(fleet(), **SETTINGS, executor=Interrupting(2), store=tmp_path / "run.zarr")

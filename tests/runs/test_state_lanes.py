@@ -91,6 +91,7 @@ def test_the_kernel_has_the_bits_of_its_twin(name, method, dtype):
         assert np.isfinite(both[0].view).all()
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("width", [1, 2, 4, 16, 32])
 def test_every_part_of_a_start_in_every_width(width):
     """Shared and individual parts of a start, in all of 2^5 forms; numbers that are none stay none."""

@@ -236,6 +236,7 @@ def spinning():
     return lw.Ensemble.from_states(scene, *states, {"wrench.torque": torque})
 
 
+@pytest.mark.ci
 def test_members_that_fail_are_left_out_from_then_on(spinning):
     settings = {"h": 0.1, "t1": 4.0, "save": lw.SaveAt(every=0.5)}
     r = lw.solve(spinning, **settings, statistics=[Mean("depth"), PathMaximum("depth")], threads=2)
@@ -257,6 +258,7 @@ def test_members_that_fail_are_left_out_from_then_on(spinning):
     np.testing.assert_array_equal(lean.kept.failure_time, r.failure_time[failed])
 
 
+@pytest.mark.ci
 def test_paths_of_members_that_fail_are_left_out(spinning):
     settings = {"h": 0.1, "t1": 4.0, "save": lw.SaveAt(every=0.5)}
     asked = [*(kind("depth") for kind in (PathMean, PathRms, PathRange)), PathTime("depth", above=0.0)]
@@ -270,6 +272,7 @@ def test_paths_of_members_that_fail_are_left_out(spinning):
         assert found.value[0, 0] == pytest.approx(truth[whole].mean(), rel=1e-12)
 
 
+@pytest.mark.ci
 def test_what_is_left_out_is_said_with_its_reason(spinning):
     settings = {"h": 0.1, "t1": 1.0}
     none = Quantity("none", lambda s, m: np.where(s["position"][..., 2] < 50.0, np.nan, 1.0), "1", ("position",))
@@ -314,6 +317,7 @@ def grounding(n=300):
     return lw.Ensemble.from_states(scene, b, *still)
 
 
+@pytest.mark.ci
 def test_members_that_stop_are_held_or_left_out():
     n = 300
     fleet = grounding(n)
@@ -330,6 +334,7 @@ def test_members_that_stop_are_held_or_left_out():
     assert lw.solve(fleet, h=0.1, t1=2.0, keep="failed", statistics=[Mean(name) for name in FIELDS]).kept is None
 
 
+@pytest.mark.ci
 def test_a_linear_gaussian_case_has_its_exact_moments():
     """M v' = S w with normal starts: b_n = b0 + v0 t + (S/M) h^(3/2) sum of (j + 1/2) xi, v_n = v0 + (S/M) h^(1/2) sum of xi.
 
@@ -691,6 +696,7 @@ statistic = "mean depth"
         assert word in faults[i]
 
 
+@pytest.mark.ci
 def test_the_command_prints_and_draws_them(path, tmp_path, capsys):
     out = tmp_path / "out"
     assert cli.main(["run", str(path), "--members", "1500", "--duration", "2", "--out", str(out)]) == 0

@@ -94,6 +94,7 @@ def test_samples_and_statistics_together(memory, tmp_path):
     assert bits(result) == bits(memory)
 
 
+@pytest.mark.ci
 def test_members_kept_are_run_again_and_after_a_resume(complete, tmp_path):
     every = lw.solve(fleet(), **SETTINGS)
     result = lw.solve(fleet(), **SETTINGS, keep=[3, 1002], store=tmp_path / "run.zarr")
@@ -128,6 +129,7 @@ def stopped(tmp_path_factory):
     return path
 
 
+@pytest.mark.ci
 def test_until_stops_a_store_at_the_same_block(stopped, tmp_path):
     memory = lw.solve(fleet(), **SETTINGS, statistics=STATISTICS, until=UNTIL)
     assert memory.members == 512
@@ -159,6 +161,7 @@ def lasting_run(path, keep, threads=None):
     return lw.solve(fleet(2048), "psi_s", **settings, statistics=STATISTICS, keep=keep, store=path)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("keep", ["none", pytest.param("all", marks=pytest.mark.slow)])
 def test_killed_and_gone_on_with(keep, tmp_path):
     path, other = tmp_path / "run.zarr", tmp_path / "other.zarr"
@@ -174,6 +177,7 @@ def test_killed_and_gone_on_with(keep, tmp_path):
     assert differing(other, path) == []
 
 
+@pytest.mark.ci
 def test_the_command_restores_the_statistics_of_the_scene(tmp_path, capsys):
     scene = (ROOT / "examples/paper.toml").read_text()
     scene += '\n[[run.statistics]]\ntype = "mean"\nof = "position"\n'
@@ -199,6 +203,7 @@ def shallow(samples, members):
     return (samples["position"][..., 2] < 10.0).astype(np.float64)
 
 
+@pytest.mark.ci
 def test_statistics_of_functions_are_asked_for_again(tmp_path):
     statistics = [lw.statistics.Mean(shallow)]
     first = lw.solve(fleet(), **SETTINGS, statistics=statistics, keep="none", store=tmp_path / "run.zarr")
@@ -218,6 +223,7 @@ def test_another_observation_is_another_run(complete):
         lw.solve(fleet(), **SETTINGS, statistics=[lw.statistics.Mean("position")], keep="none", store=store)
 
 
+@pytest.mark.ci
 def test_replicates_of_a_store_are_those_of_memory(tmp_path):
     base = fleet(2)
     members = lw.Ensemble(base.scene, 1024, 1, base.vary, lw.designs.Sobol(replicates=16))

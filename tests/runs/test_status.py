@@ -21,6 +21,7 @@ def scene():
     return scene_of((2.0, 3.0, 4.0), (1.0, 2.0, 2.5), net=-0.1, moment=(0.0, 0.0, -1e-9))
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(("method", "solver"), PAIRS)
 @pytest.mark.parametrize("axis", [0, 1, 2])
 def test_step_too_large(scene, method, solver, axis):
@@ -36,6 +37,7 @@ def test_step_too_large(scene, method, solver, axis):
     np.testing.assert_array_equal(result.angular_velocity[1, 1:], Om[1:])
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("method", ["psi_x", pytest.param("psi_x8", marks=pytest.mark.slow)])
 def test_turns_too_large(scene, method):
     # Half the angle of a turn, h Om / 4, stays below 1; the tangent's series is
@@ -94,6 +96,7 @@ def test_failure_on_the_way(scene):
         assert np.abs(np.diff(frozen[: k + 1], axis=0)).max() > 0.0 or name in ("position", "velocity")
 
 
+@pytest.mark.ci
 def test_not_converged(scene):
     states = random_states(3, 9, 0.5, 3.0)
     rough = lw.solve(one(scene, *states), lw.Method("psi_s", iterations=0), h=0.2, t1=1.0)
@@ -126,6 +129,7 @@ def test_ragged_packets(scene, n):
     assert result.status.counts() == {"ok": n}
 
 
+@pytest.mark.ci
 def test_checks_none_leaves_the_code_out(scene):
     states = random_states(8, 9)
     checked = lw.solve(one(scene, *states), h=0.01, t1=0.5)

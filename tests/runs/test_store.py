@@ -248,6 +248,7 @@ DAMAGED = (*((name, word) for name in ("position/c.0.2.0", "status/c.1", "vehicl
 BLOCK_OF = {"position/c.0.2.0": 512, "status/c.1": 256, "vehicle.mass/c.3": 768, "attitude/c.0.0.0.0": 0}
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(("name", "word"), DAMAGED)
 def test_damage_is_seen_and_its_block_alone_runs_again(copy, complete, name, word, capsys):
     HARMS[word](copy / name, None)
@@ -311,6 +312,7 @@ def test_what_was_there_is_told(copy):
     assert not result.run_seconds
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("name", ["blocks/000000256.json", "velocity/c.0.2.0"])
 def test_a_missing_block_is_one_line_with_the_remedy(copy, name, tmp_path, capsys):
     """Its members would be drawn as if they had failed."""
@@ -404,6 +406,7 @@ def test_a_run_that_is_not_complete_is_not_opened_by_mistake(tmp_path):
     assert "2 blocks are missing" in some.messages[-1]
 
 
+@pytest.mark.ci
 def test_parts_of_a_run_are_merged(tmp_path, complete):
     for name, only in (("a", range(0, 1)), ("b", range(2, 4)), ("c", range(0, 2))):
         lw.solve(fleet(), **SETTINGS, store=tmp_path / name / "run.zarr", blocks=only)
@@ -471,6 +474,7 @@ def test_blocks_beyond_the_run_are_refused(tmp_path):
         lw.solve(fleet(), **SETTINGS, blocks=range(0, 1))
 
 
+@pytest.mark.ci
 def test_explicit_states_and_subsets_go_on_from_the_store_alone(tmp_path):
     chosen = fleet(600).subset(np.arange(599, 99, -1))
     lw.solve(chosen, **SETTINGS, store=tmp_path / "a.zarr")
@@ -486,6 +490,7 @@ ARRAYS = {"table": lambda u: lw.designs.Table({"vehicle.mass": 123.0 + u[:, 0], 
           "levels": lambda u: lw.designs.UnitCubePoints(u)}  # fmt: skip
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("kind", ARRAYS)
 def test_values_given_as_arrays_lie_in_the_store_as_arrays(kind, tmp_path):
     def members(u):
@@ -532,6 +537,7 @@ class Mine(lw.terms.Wrench):
     type = "mine"
 
 
+@pytest.mark.ci
 def test_a_law_of_your_own_goes_on_with_its_ensemble(tmp_path, monkeypatch):
     # As in another process, which has not made the class: no scene file knows it.
     monkeypatch.delitem(lw.laws.Term.kinds, "mine")
@@ -636,6 +642,7 @@ def test_chunks_are_synced_before_their_block_is_marked(tmp_path):
     assert order.index(("named", f"{root}/zarr.json")) > marked
 
 
+@pytest.mark.ci
 def test_parts_of_keepers_lie_in_the_store(tmp_path, memory):
     plan = make_plan(fleet(), **SETTINGS)
     plan.compile()
@@ -733,6 +740,7 @@ class Tilted:
         return 0.1 * np.sqrt(u)
 
 
+@pytest.mark.ci
 def test_a_distribution_of_your_own_goes_on_with_its_ensemble(tmp_path):
     def own():
         return lw.Ensemble(fleet().scene, 600, 1, {"start.position": Tilted()})

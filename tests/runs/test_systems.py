@@ -53,6 +53,7 @@ def test_solve_in_memory():
     assert result.status.counts()["ok"] == 8
 
 
+@pytest.mark.ci
 def test_a_result_is_saved_and_read(runs, tmp_path):
     result = lw.Result.load(runs / "memory" / "result.npz")
     for _ in range(2):  # the second replaces the first
@@ -67,6 +68,7 @@ def test_a_store_has_the_numbers_of_a_run_in_memory(runs):
     assert sorted(path.name for path in (runs / "store").iterdir() if not path.name.startswith("fleet")) == ["run.zarr"]
 
 
+@pytest.mark.ci
 def test_a_stopped_run_goes_on(copied, capsys):
     path = copied / "store" / "run.zarr"
     (path / "blocks" / "000000000.json").unlink()
@@ -74,6 +76,7 @@ def test_a_stopped_run_goes_on(copied, capsys):
     assert cli.main(["resume", str(path)]) == cli.main(["info", str(path)]) == 0
 
 
+@pytest.mark.ci
 def test_a_run_is_overwritten(copied):
     assert run(copied / "store", "--store", "zarr", "--overwrite") == 0
     assert [path.name for path in (copied / "store").iterdir() if "zarr" in path.name] == ["run.zarr"]
@@ -91,6 +94,7 @@ def test_pictures_and_a_report(copied):
     assert "</html>" in (folder / "report.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.ci
 def test_a_sweep_finds_its_cells(tmp_path, capsys):
     (tmp_path / "sweep.toml").write_text(SWEEP, encoding="utf-8")
     for _ in range(2):
@@ -109,6 +113,7 @@ def test_a_folder_in_the_place_of_a_file_is_refused(tmp_path, capsys):
     assert "is a folder" in capsys.readouterr().err
 
 
+@pytest.mark.ci
 def test_a_scene_is_begun_and_checked(tmp_path, capsys):
     for code in (0, 2):  # the second finds the first
         assert cli.main(["new", str(tmp_path / "new" / "scene.toml")]) == code

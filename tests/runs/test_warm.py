@@ -28,6 +28,7 @@ def kernel_of_solve(scene, *arguments, **named):
     return begun.call_args.args[0].spec
 
 
+@pytest.mark.ci
 def test_every_method_and_precision_has_a_kernel():
     scene = lw.Scene.load(PAPER)
     kernels = kernels_of(scene, ["psi_s", "rk4", "psi_s"], ["float64", "float32"])

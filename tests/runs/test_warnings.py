@@ -36,6 +36,7 @@ def munk_speed(w, scene):
     return p / M[2]
 
 
+@pytest.mark.ci
 @pytest.mark.slow_for("kl8*")
 @pytest.mark.parametrize("checks", ["safe", "all"])
 @pytest.mark.parametrize("method", ["psi_s", "kl8(psi_s)"])
@@ -60,6 +61,7 @@ def test_munk_beyond_the_limit_of_the_method(method):
     assert result.warnings.counts() == {"munk_coarse": 2, "munk_unstable": 1}
 
 
+@pytest.mark.ci
 def test_munk_that_arises_on_the_way():
     # A heavy vehicle sinks from rest along its heavy axis: p = net t, so that the row is crossed at a known time.
     scene, h = scene_of(**MUNK | {"net": 2.0}), 0.02
@@ -86,6 +88,7 @@ def test_restoring(factor, warning):
             assert result.warning_value[0] == pytest.approx(part * factor)
 
 
+@pytest.mark.ci
 @pytest.mark.slow_for("rk4")
 @pytest.mark.parametrize("method", ["rk4", "psi_x"])
 def test_rotation(method):
@@ -98,6 +101,7 @@ def test_rotation(method):
     assert result.warning_value[1] == pytest.approx(ABOVE * limit)
 
 
+@pytest.mark.ci
 def test_rotation_on_the_way():
     # A steady moment about a principal axis: |Omega| = moment t / J. Looks are every 128 steps; the second is too late by 0.2.
     h, J, seen, limit = 0.01, 2.5, 256, limits.TURNS
@@ -154,6 +158,7 @@ def test_precision_far_from_the_origin(checks):
     )
 
 
+@pytest.mark.ci
 def test_precision_on_the_way():
     h, v = 0.01, 1.0
     far = PRECISION * h * v / np.finfo(np.float32).eps
@@ -164,6 +169,7 @@ def test_precision_on_the_way():
     assert 2.8 <= result.warning_time[0] <= 3.0 + 1.28 + 0.3
 
 
+@pytest.mark.ci
 def test_orthogonality():
     # A row of R shrinks by (h Om)^6 / 144 of itself in a step of rk4: 128 steps cross 1e-3 at the coarser step only.
     fleet = one(scene_of(**PLAIN), Om=[0.0, 0.0, 1.0])
@@ -180,6 +186,7 @@ def shrunk(z, steps):
     return 1.0 - growth ** (2 * steps)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("kept", [
     {}, {"keep": "none", "statistics": [lw.statistics.Mean("position")]}, {"keep": [1]},
     {"save": lw.SaveAt(every=12.8)},
@@ -215,6 +222,7 @@ def test_an_attitude_that_was_no_rotation_on_the_way_is_told(dtype):
     assert result.warning_value[0] == pytest.approx(shrunk(0.4, 128), rel=1e-4 if dtype == "float64" else 1e-2)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("checks", ["safe", pytest.param("all", marks=pytest.mark.slow)])
 def test_an_attitude_of_a_member_that_stopped_is_told_of_where_it_stopped(tmp_path, checks):
     scene = scene_of(**PLAIN)
@@ -229,6 +237,7 @@ def test_an_attitude_of_a_member_that_stopped_is_told_of_where_it_stopped(tmp_pa
         assert 19.5 < result.warning_time[0] <= 20.0
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("checks", ["safe", "all"])
 @pytest.mark.parametrize("method", ["psi_x", pytest.param("psi_w", marks=pytest.mark.slow)])
 def test_stiff_drag_of_splittings(method, checks):
@@ -310,6 +319,7 @@ def unstable():
     return lw.Ensemble.from_states(scene, b, R, 0.0 * b, 0.0 * b, {"tether.stiffness": stiffness})
 
 
+@pytest.mark.ci
 @pytest.mark.slow_for("float32*")
 @pytest.mark.parametrize("dtype", ["float64", "float32"])
 def test_energy_that_explodes_is_a_failure(unstable, dtype):
@@ -326,6 +336,7 @@ def test_energy_that_explodes_is_a_failure(unstable, dtype):
         assert getattr(alone, name)[:, 0].tobytes() == getattr(result, name)[:, 0].tobytes()
 
 
+@pytest.mark.ci
 def test_energy_is_warned_of_before(unstable):
     result = lw.solve(unstable, "psi_s", h=1.0, t1=128.0, checks="all")
     assert warned(result, Warnings.ENERGY) == [False, result.status[1] == Status.OK]
@@ -347,6 +358,7 @@ def test_energy_of_healthy_scenes_is_quiet():
             assert not warned(result, Warnings.ORTHOGONALITY)[0]
 
 
+@pytest.mark.ci
 def test_a_swing_from_rest_is_no_failure():
     # Nothing moves at the start, and Phi's energy swings by more than what was put in: bounded, and told of.
     scene = scene_of((2.0, 2.0, 2.0), (1.0, 1.0, 1.0), moment=(0.0, 0.0, -(1.3**2)))
@@ -357,6 +369,7 @@ def test_a_swing_from_rest_is_no_failure():
         assert np.abs(result.angular_velocity[-1]).max() < 1.0
 
 
+@pytest.mark.ci
 @pytest.mark.slow_for("psi_x", "rk4*")
 @pytest.mark.parametrize("method", ["psi_s", "psi_x", "rk4"])
 def test_energy_is_that_of_the_result(method, monkeypatch):
@@ -442,6 +455,7 @@ def test_drag_that_arises_in_backward_stages():
     assert plain.status.counts() == {"ok": 1}
 
 
+@pytest.mark.ci
 def test_a_neighbour_that_warns_or_fails_changes_no_bit():
     scene = scene_of(**MUNK | {"net": 0.3})
     b, R, nu, Om = random_states(4, 8, 0.3, 0.3)
@@ -458,6 +472,7 @@ def test_a_neighbour_that_warns_or_fails_changes_no_bit():
         np.testing.assert_array_equal(getattr(quiet, name)[well], getattr(loud, name)[well])
 
 
+@pytest.mark.ci
 def test_warnings_do_not_depend_on_what_is_kept():
     scene = scene_of(**MUNK | {"net": 2.0})
     runs = [
@@ -468,6 +483,7 @@ def test_warnings_do_not_depend_on_what_is_kept():
     assert runs[0].warnings[0] == runs[1].warnings[0] != 0
 
 
+@pytest.mark.ci
 def test_checks_none_warns_of_nothing():
     scene = scene_of(**MUNK)
     result = lw.solve(one(scene, nu=[0.0, 0.0, 1e3]), h=0.1, t1=0.1, checks="none")
@@ -518,6 +534,7 @@ def test_a_result_keeps_its_warnings(tmp_path):
 FORM = lw.terms.QuadraticForm(products=["X_u|u|", "Z_uw", "M_uq"], values=[-500.0, -20.0, -10.0])
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(("term", "axis"), [(FORM, 0), (lw.terms.Polar(drag_by_attack=60.0), 2)])
 def test_stiff_drag_is_warned_of_where_it_does_not_grow_with_sizes_and_speeds(term, axis):
     """A form brakes where its coefficients are negative; a glider's polar less at an angle of attack than across the flow."""

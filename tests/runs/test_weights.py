@@ -48,6 +48,7 @@ def result():
     return lw.solve(fleet_of(3000), **SETTINGS, statistics=ASKED)
 
 
+@pytest.mark.ci
 def test_estimates_are_those_of_the_wanted_distribution(result):
     """Within four told errors of the closed forms; the spread of told errors is some percent."""
     found = result.statistics
@@ -67,6 +68,7 @@ def test_estimates_are_those_of_the_wanted_distribution(result):
     assert not any("table" in text for text in result.messages)
 
 
+@pytest.mark.ci
 def test_samples_at_hand_stores_and_other_processes_give_the_same(result, tmp_path):
     assert_same(lw.gather(result, ASKED), result.statistics)
     path = tmp_path / "run.zarr"
@@ -82,6 +84,7 @@ def test_samples_at_hand_stores_and_other_processes_give_the_same(result, tmp_pa
     assert_same(lw.gather(pickle.loads(pickle.dumps(loaded)), ASKED), result.statistics)
 
 
+@pytest.mark.ci
 def test_weights_afterwards_are_those_of_a_table(result):
     """The same draws without weights, weighed when they are asked."""
     columns = drawn(3000, 0)

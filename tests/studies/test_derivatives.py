@@ -47,6 +47,7 @@ def agrees(found, truth, most=1e-7):
     assert (found.error <= most * np.maximum(np.abs(truth), 1e-3)).all(), found.error
 
 
+@pytest.mark.ci
 def test_a_fall_against_quadratic_drag():
     """m v' = F - k v^2 from rest: z = m / k ln cosh(t sqrt(F k) / m)."""
     by = ["vehicle.buoyancy", "drag.quadratic[2]", "start.position[2]"]
@@ -64,6 +65,7 @@ def test_a_fall_against_quadratic_drag():
     assert found.by == tuple(by)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("method", ["psi_s", "psi_x"])
 def test_derivatives_have_the_order_of_the_method(method):
     """Half the step is a fourth of the error, of value and derivative."""
@@ -82,6 +84,7 @@ def turned(result):
     return np.unwrap([np.full(len(R), 0.7 * T1), np.arctan2(R[:, 1, 0], R[:, 0, 0])], axis=0)[1]
 
 
+@pytest.mark.ci
 def test_free_motion_and_steady_spin():
     """Without forces a body goes straight on, and turns evenly about a principal axis."""
     start = lw.Start(rotation_vector=[0.0, 0.0, 0.3], velocity=[1.2, 0.0, 0.0], angular_velocity=[0.0, 0.0, 0.7])
@@ -193,6 +196,7 @@ def test_what_goes_in_steps_is_named():
     assert smooth.error[0, -1] < 1e-6 * abs(smooth.jacobian[0, -1])
 
 
+@pytest.mark.ci
 def test_what_differences_disagree_about():
     def kinked(result):
         return np.abs(result.position[-1, :, 1])
@@ -213,6 +217,7 @@ def test_what_differences_disagree_about():
     assert abs(found.jacobian[3, 1] - 1.0) <= found.error[3, 1]
 
 
+@pytest.mark.ci
 def test_a_start_that_grows_beyond_measure():
     """A turn about the middle axis grows by exp(0.169 w t)."""
     start = lw.Start(angular_velocity=[0.0, 20.0, 0.0])
@@ -281,6 +286,7 @@ def pushed(interpolation):
     return body(0.0, terms=[lw.terms.WrenchSchedule(times=times, force=forces, interpolation=interpolation)])
 
 
+@pytest.mark.ci
 def test_times_at_which_a_schedule_jumps():
     """A push that begins at 1 s begins at the step after it; one that grows, at that time."""
     by, run = ["wrench_schedule.times[1]", "wrench_schedule.force[1,0]"], RUN | {"method": "psi_x", "h": 0.1, "t1": 3.0}
@@ -314,6 +320,7 @@ def test_legs_of_waypoints():
     says(between.undefined["position[1] at 4.9 by heading_pid.kp"], "1 of them were")
 
 
+@pytest.mark.ci
 def test_a_number_that_may_not_be_less():
     """The first drag of a fall in vacuum: z = F t^2 / 2 m - k F^2 t^4 / 12 m^3."""
     found = lw.derivatives(body(), "depth", "drag.quadratic[2]", **RUN)
@@ -332,6 +339,7 @@ def test_a_number_that_cannot_be_moved_leaves_the_others():
     assert not found.messages
 
 
+@pytest.mark.ci
 def test_quantities_of_signals_alone():
     save = lw.SaveAt(at=[T1], fields=("command",))
     found = lw.derivatives(looped(), lambda result: result.command[-1, :, 2], "state_feedback.K[2,2]", save=save, **RUN)
@@ -347,6 +355,7 @@ def fallen(F, k=QUADRATIC):
     return M / k * np.log(np.cosh(s)), -M / k * np.tanh(s) * s / (2.0 * F)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("members", [1, 11])
 def test_a_fleet_has_an_axis_of_members(members):
     vary = {
@@ -375,6 +384,7 @@ def test_a_fleet_has_an_axis_of_members(members):
     assert not np.isin(again.value, plain.value).any()
 
 
+@pytest.mark.ci
 def test_members_that_need_other_increments_than_the_first_ones():
     """Almost neutral bodies: drag by the square of the speed is no power series in the weight across its sign."""
     heavy = np.array([HEAVY] * 9 + [1.9e-4, -5.7e-5, 3e-3])
@@ -460,6 +470,7 @@ def found():
                           **RUN, save=lw.SaveAt(every=1.0))  # fmt: skip
 
 
+@pytest.mark.ci
 def test_the_answer_in_words_and_files(found, tmp_path):
     says(str(found), "depth = ", "by vehicle.buoyancy", " +- ", "max(depth) = ")
     for again in (pickle.loads(pickle.dumps(found)), copy.copy(found), copy.deepcopy(found)):
@@ -480,6 +491,7 @@ def test_the_answer_in_words_and_files(found, tmp_path):
     np.testing.assert_array_equal(found.jacobian[0], found.jacobian[1])
 
 
+@pytest.mark.ci
 def test_progress_and_executors(found):
     shares = []
     other = lw.derivatives(body(quadratic=QUADRATIC), ["depth", "max(depth)"], ["vehicle.buoyancy", "start.position[1]"],

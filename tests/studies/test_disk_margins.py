@@ -23,6 +23,7 @@ from tests.support.turning_loops import (
 )
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     "skew", [0.0, pytest.param(1.0, marks=pytest.mark.slow), pytest.param(-0.5, marks=pytest.mark.slow)]
 )
@@ -61,6 +62,7 @@ def swept(A, B, C, frequencies):
     return 1.0 / largest
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(("inertia", "delay"), [
     (INERTIAS[0], 0.0), *(pytest.param(*each, marks=pytest.mark.slow) for each in zip(INERTIAS[1:], LATE[1:], strict=True)),
 ])  # fmt: skip

@@ -119,6 +119,7 @@ def count_held(name, error, seeds):
     return sum(each.interval[0] <= truth <= each.interval[1] for each in found)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("name", ["1 in 100 sinks", "1.4 % stop", "1.4 % clipped", "1 % jump", "lognormal"])
 def test_a_few_seeds_hold(name):
     """Five of 6 intervals of 95 % hold, but in 3 of 100 tries."""
@@ -133,12 +134,14 @@ def test_intervals_hold(name, place_of_error):
     assert count_held(name, CASES[name][1][place_of_error], range(40)) >= 35
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(("error", "seeds", "least"), [(1.0, 40, 37), (0.3, 20, 19)])
 def test_members_in_the_middle_that_are_odd_are_seen(error, seeds, least):
     """By probes far out alone, 29 of 40 and 17 of 20 intervals held."""
     assert count_held("1 % in the middle", error, range(seeds)) >= least
 
 
+@pytest.mark.ci
 def test_a_share_that_was_not_seen_is_told():
     """1 in 1,000 whose effect is 1,000: the interval holds, or a message tells that so few members were not seen."""
     fleet, of, truth, _ = banded(0.001, 1000.0)
@@ -190,6 +193,7 @@ def test_a_heavy_tail_is_told_where_it_is_asked_for():
     assert np.isfinite(found.value)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("probability", [0.05, 0.01, 0.001])
 def test_a_relative_error_of_a_rare_condition(probability):
     """The pilot goes on until it has hits: no seed is refused, and the error seen is about the one asked for."""
@@ -205,6 +209,7 @@ def test_a_relative_error_of_a_rare_condition(probability):
     assert np.sqrt(np.mean(np.square(apart))) < 0.4
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("share", [0.01, 0.001])
 def test_a_relative_error_of_a_share_that_is_written_as_a_mean(share):
     """The pilot goes on until members have a number other than 0, as it does for a condition."""
@@ -237,6 +242,7 @@ def quantiles_held(seeds):
     return held
 
 
+@pytest.mark.ci
 def test_far_quantiles_of_a_few_seeds_hold():
     assert quantiles_held(range(6)) >= 5
 
@@ -247,6 +253,7 @@ def test_far_quantiles_hold():
     assert quantiles_held(range(160)) >= 148
 
 
+@pytest.mark.ci
 def test_one_seed_gives_one_answer_and_its_recipe_the_same(tmp_path):
     """Choices follow counted costs. A recipe that was written to a file reruns the members to the bit, on other threads."""
     fleet, above = resting(north=NORMAL(std=1.0), east=NORMAL(std=0.5)), "position[0] above 1.6"
@@ -272,6 +279,7 @@ def test_one_seed_gives_one_answer_and_its_recipe_the_same(tmp_path):
     assert again.recipe["seed"] == 3
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("of", ["quantile", "strata", "levels", "one run", "rounds"])
 def test_recipes_of_every_kind_give_the_same_bits(of):
     fleet, quantity, _, how = one_in(20) if of == "strata" else stopped(0.05) if of == "rounds" else jumping(0.05)

@@ -36,6 +36,7 @@ def estimated(name, seed=0, **settings):
     return lw.estimate(make(), of, settings.pop("error", error), seed=seed, **RUN, **how, **settings), truth
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("name", KNOWN)
 def test_answers_are_near_the_truth(name):
     """Four times the error that is told is passed once in 15,000 times; error told is at most about the one asked."""
@@ -48,6 +49,7 @@ def test_answers_are_near_the_truth(name):
     assert found.provenance["versions"]
 
 
+@pytest.mark.ci
 def test_the_same_seed_gives_the_same_bits():
     """Choices follow costs, which vary; a fixed step, and so few members that none is chosen, do not."""
     few = [estimated("fall", error=1.0, h=0.5)[0] for _ in range(2)]
@@ -55,6 +57,7 @@ def test_the_same_seed_gives_the_same_bits():
     assert few[0].value != estimated("fall", 1, error=1.0, h=0.5)[0].value
 
 
+@pytest.mark.ci
 def test_small_errors_cost_less_than_plain_members():
     found, truth = estimated("fall", error=1e-3)
     assert abs(found.value - truth) <= 4e-3
@@ -63,6 +66,7 @@ def test_small_errors_cost_less_than_plain_members():
     assert max(found.rivals.values()) > 10.0
 
 
+@pytest.mark.ci
 def test_a_fixed_step_has_its_bias_told():
     """An order-2 method at 2 s, a fifth of the relaxation: the truth is inside the interval, which the bias widens."""
     vary = {"vehicle.buoyancy": lw.distributions.Normal(std=1.0)}
@@ -75,6 +79,7 @@ def test_a_fixed_step_has_its_bias_told():
     assert found.value - truth - 0.02 <= found.bias_interval[1]
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("where", ["argument", "scene"])
 def test_a_step_longer_than_the_run_has_its_bias_told(where):
     """A step of 50 s is made as one of 20 s, and half of it too: the bias is told by half of what is made."""
@@ -89,6 +94,7 @@ def test_a_step_longer_than_the_run_has_its_bias_told(where):
     assert found.interval[0] <= 400.0 + closed.fall() <= found.interval[1]
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("h", [None, 0.125])
 def test_single_precision_has_its_bias_told(h):
     """At 1e6 m positions are multiples of 1/16 m: steps of 0.125 s lose what they move by, at any step of that precision."""
@@ -110,12 +116,14 @@ def test_a_suggestion_for_a_mean_knows_the_bias_of_a_scene_in_single_precision()
     assert found.settings["dtype"] == "float64"
 
 
+@pytest.mark.ci
 def test_an_error_above_the_spread_takes_few_members():
     found, truth = estimated("fall", error=20.0)
     assert sum(found.members.values()) <= 64
     assert abs(found.value - truth) < 20.0
 
 
+@pytest.mark.ci
 def test_what_does_not_vary_is_one_run():
     found = lw.estimate(lw.Ensemble(closed.sphere(), 4), "mean position[2]", 1e-3, **RUN)
     assert found.estimator == "one run"
@@ -124,6 +132,7 @@ def test_what_does_not_vary_is_one_run():
     says(" ".join(found.messages), "nothing varies and no noise acts")
 
 
+@pytest.mark.ci
 def test_noise_without_numbers_that_vary():
     fleet = lw.Ensemble(closed.pushed().scene, 4)
     found = lw.estimate(fleet, "mean position[0]", 0.05, **RUN)
@@ -131,6 +140,7 @@ def test_noise_without_numbers_that_vary():
     assert found.estimator in ("plain Monte Carlo", "levels")
 
 
+@pytest.mark.ci
 def test_one_number_that_varies_and_a_relative_error():
     fleet = lw.Ensemble(closed.sphere(), 4, vary={"vehicle.buoyancy": lw.distributions.Normal(std=4.0)})
     found = lw.estimate(fleet, lambda result: result.position[-1, :, 2] - 400.0, relative_error=1e-3, **RUN)
@@ -138,6 +148,7 @@ def test_one_number_that_varies_and_a_relative_error():
     assert found.value == pytest.approx(closed.fall(), rel=4e-3)
 
 
+@pytest.mark.ci
 def test_steps_at_which_members_fail_are_left_out():
     """Explicit steps of 1 s overflow where drag relaxes in 0.03 s."""
     scene = closed.sphere()
@@ -157,11 +168,13 @@ def test_the_probability_of_an_event():
     assert 0.0 <= found.interval[0] < found.interval[1] <= 1.0
 
 
+@pytest.mark.ci
 def test_a_cheaper_scene_may_carry_a_level():
     found, truth = estimated("fall", error=2e-3, cheaper=[{"environment.gravity": closed.GRAVITY}])
     assert abs(found.value - truth) <= 8e-3
 
 
+@pytest.mark.ci
 def test_members_that_two_steps_leave_apart():
     """A number that the last digits of a position decide: its mean over a normal position is 0."""
 
@@ -188,6 +201,7 @@ def test_the_page(tmp_path, monkeypatch):
     assert abs(found.value - finer.position[-1, :, 0].mean()) < 0.04
 
 
+@pytest.mark.ci
 def test_refusals():
     fleet = closed.falling()
 
@@ -214,6 +228,7 @@ def test_refusals():
     says(ask(fleet=fails, h=0.5), "64 of 64 members fail", "Give a shorter step")
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("name", ["plain Monte Carlo", "sobol", "regression"])
 def test_an_estimator_may_be_fixed(name):
     found, truth = estimated("fall", estimator=name, h=0.5)
@@ -223,6 +238,7 @@ def test_an_estimator_may_be_fixed(name):
     assert (found.value, found.interval) == (again.value, again.interval)
 
 
+@pytest.mark.ci
 def test_levels_may_be_fixed_and_what_cannot_be_had_is_refused():
     found, truth = estimated("north", error=0.02, estimator="levels", h=0.5)
     assert found.estimator == "levels"
@@ -239,6 +255,7 @@ def test_processes_have_the_bits_of_threads():
     assert estimated("fall", executor="processes", **how)[0].value == estimated("fall", **how)[0].value
 
 
+@pytest.mark.ci
 def test_progress_ends_at_one_and_an_interrupt_says_how_far_it_was():
     parts = []
     estimated("fall", progress=parts.append)
@@ -252,6 +269,7 @@ def test_progress_ends_at_one_and_an_interrupt_says_how_far_it_was():
         estimated("fall", progress=stop)
 
 
+@pytest.mark.ci
 def test_a_suggestion_for_a_mean_stands_on_the_same_bias():
     """An order-4 method on a fall that relaxes in 10 s: the mean of a run at the suggested step is as near as told."""
     fleet = closed.falling()
@@ -297,6 +315,7 @@ def test_intervals_hold_over_seeds(name):
     assert np.sqrt(np.mean(np.square(apart))) <= 1.25 * np.sqrt(np.mean(np.square(told)))
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("risk", [0.99, 0.999, 0.01, lw.metrics.CVaR(0.05), lw.metrics.CVaR(0.01)], ids=str)
 def test_tails_have_members_in_them(risk):
     # A sphere that sinks against linear drag: its depth is linear in its normal start.

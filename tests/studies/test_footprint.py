@@ -26,6 +26,7 @@ def result():
     return lw.solve(FLEET, save=lw.SaveAt(every=0.5), **RUN)
 
 
+@pytest.mark.ci
 def test_a_run_in_a_store_has_the_same_footprint(result, tmp_path, monkeypatch):
     lw.solve(FLEET, save=lw.SaveAt(every=0.5), store=tmp_path / "run.zarr", **RUN)
     stored = lw.open_run(tmp_path / "run.zarr")
@@ -54,6 +55,7 @@ def test_the_floor_is_where_the_members_reach_it(result):
     np.testing.assert_allclose(found.centre, result.position[-1, there, :2].mean(axis=0), rtol=1e-12)
 
 
+@pytest.mark.ci
 def test_the_command_says_and_writes_it(result, tmp_path, capsys):
     result.save(tmp_path / "result.npz")
     assert cli.main(["footprint", str(tmp_path), "--at", "floor"]) == 0

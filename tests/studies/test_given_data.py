@@ -46,6 +46,7 @@ def test_shares_are_those_of_the_closed_form(result):
     assert found.first[2, at] == pytest.approx(START**2 / (START**2 + (0.5 * SPEED) ** 2), abs=0.02)
 
 
+@pytest.mark.ci
 def test_a_store_and_a_file_give_the_same(fleet, result, tmp_path):
     lw.solve(fleet, **SETTINGS, store=tmp_path / "run.zarr")
     asked = ["depth", "max(position)", "end_time floor"]

@@ -91,6 +91,7 @@ def interval(text):
     return float(low), float(high)
 
 
+@pytest.mark.ci
 def test_a_run_and_its_footprint(case, line, capsys):
     text = line("run", "fleet.toml")
     assert text.startswith("All 200 members end ok at 2 s")
@@ -107,6 +108,7 @@ def test_a_run_and_its_footprint(case, line, capsys):
         assert float(north) == pytest.approx(case.at_mean, abs=4.0 * spread / math.sqrt(200))
 
 
+@pytest.mark.ci
 def test_an_estimate(case, line):
     text = line("estimate", "fleet.toml", "--of", case.of, "--error", "0.01")
     assert text.startswith(f"mean {case.of} is ")
@@ -115,6 +117,7 @@ def test_an_estimate(case, line):
     assert "0.01 requested." in text
 
 
+@pytest.mark.ci
 def test_a_rare_event(case, line):
     sign = math.copysign(1.0, case.slope)
     bound = case.at(case.mean + sign * 4.0 * STD)
@@ -129,6 +132,7 @@ def test_a_rare_event(case, line):
     near(text.partition("on average")[2], beyond, rel=0.05)
 
 
+@pytest.mark.ci
 def test_sensitivity_and_derivatives(case, line):
     text = line("sensitivity", "fleet.toml", "--of", case.of, "--samples", "256", "--duration", "2")
     assert text.startswith(f"{case.of} depends most on {case.number} (")
@@ -155,6 +159,7 @@ def test_a_worst_case_and_the_best_number(case, line):
     assert f"{case.number} " in text
 
 
+@pytest.mark.ci
 def test_a_sweep(case, line, tmp_path):
     values = [case.mean - 0.1, case.mean, case.mean + 0.1]
     grows = case.slope > 0.0
@@ -174,6 +179,7 @@ def test_a_sweep(case, line, tmp_path):
     near(worst, values[2] if grows else values[0], 0.0, 0.0)
 
 
+@pytest.mark.ci
 def test_what_methods_cost_and_where_they_hold(case, line):
     text = line(
         "tradeoff", "one.toml", "--of", "position", "--methods", "psi_x,rk4", "--duration", "1", "--seconds", "10"

@@ -39,6 +39,7 @@ def at(names, *wanted):
     return [names.index(name) for name in wanted]
 
 
+@pytest.mark.ci
 def test_a_trim_balances_the_forces_of_the_equations():
     found = lw.linear.trim(hover(), 1.5, method="psi_s", h=0.02)
     R, nu = found.start.attitude, found.start.velocity

@@ -10,6 +10,8 @@ import pytest
 import lgvi_warp as lw
 from lgvi_warp import cli
 
+pytestmark = pytest.mark.ci
+
 MASS, INERTIA, KD, PERIOD, STEP, DRAG = 20.0, 11.0, 9.0, 0.1, 0.02, 40.0
 # The error of a method of order two, in parts of a motion that linear drag slows: docs/guide/methods.md.
 ORDER_TWO = 1.01 * (DRAG * STEP / MASS) ** 2 / 12.0

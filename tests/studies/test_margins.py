@@ -116,6 +116,7 @@ def test_margins_by_runs_are_those_at_which_the_envelope_shrinks(fleet, found):
     assert np.abs(found.by_runs["delay"] - found.values["delay"]).max() <= H * (1.0 + 1e-9)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     "steps", [3, pytest.param(0, marks=pytest.mark.slow), pytest.param(11, marks=pytest.mark.slow)]
 )
@@ -321,6 +322,7 @@ def sampled(limit=49.85, heading=0.0, most=1e6, **gains):
     return dataclasses.replace(one, controller=controller, terms=[ControlWrench(limit=[most] * 6)])
 
 
+@pytest.mark.ci
 @pytest.mark.slow_for("240.0-1e-05-*", "900.0-*")
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize(("seconds", "tilt", "heading", "most"), [
@@ -340,6 +342,7 @@ def test_a_gain_limit_that_is_known_for_any_length_of_runs_heading_and_limit(sec
         assert values["gain_upper"][0] == pytest.approx(49.85, rel=1e-5 if by == "eigenvalues" else 3e-3)
 
 
+@pytest.mark.ci
 def test_runs_judge_swings_by_angles_and_not_by_parts_of_limits():
     """A demand of 60 N m/rad at factors up to 5 is 60 tilts of a limit of 5 N m: small all the same, since it shrinks."""
     one = dataclasses.replace(scene(delay=0.06, kp=60.0, ki=0.0, kd=20.0), terms=[ControlWrench(limit=[5.0] * 6)])
@@ -350,6 +353,7 @@ def test_runs_judge_swings_by_angles_and_not_by_parts_of_limits():
         assert found.by_runs["gain_upper"][0] == pytest.approx(expected, rel=3e-3 if seconds == 240.0 else 1e-2)
 
 
+@pytest.mark.ci
 @pytest.mark.slow_for("0.3076565-*")
 @pytest.mark.parametrize(("kp", "ki", "kd", "drag", "steps", "most", "tilt"), [
     # Beyond the limit a swing that starts from 1e-5 rad wraps around, where its last third is by chance below its second.
@@ -429,6 +433,7 @@ def test_a_loop_within_a_dead_band_moves_nothing():
     assert np.isnan(found.values["gain_upper"][0])
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("by", ["eigenvalues", "runs"])
 def test_noise_is_taken_as_its_mean_and_faults_as_off(by):
     """A fault whose time varies, too: margins are those of the loop without them, to the bit, and say what they leave out."""
@@ -453,6 +458,7 @@ def test_noise_is_taken_as_its_mean_and_faults_as_off(by):
         lw.linear.margins(lw.Ensemble(noisy, 2, 1, {"sensor.noise": Uniform(0.0, 0.2)}), by=by, h=H)
 
 
+@pytest.mark.ci
 def test_a_closed_model_leaves_out_what_has_the_mean_0():
     whole = scene()
     sensor, clean = (Sensor(of="heading", **more) for more in ({"noise": 0.1, "quantum": 0.1}, {}))

@@ -71,6 +71,7 @@ def ran(monkeypatch):
     return batches
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("name", CALLS)
 def test_an_interrupted_call_goes_on_with_the_same_answer(name, tmp_path, ran):
     call, _ = CALLS[name]
@@ -107,6 +108,7 @@ def split(**more):
     return lw.rare_event(members, "position[0] - 6.0", method="psi_x", h=0.1, t1=3.0, threads=1, **more)
 
 
+@pytest.mark.ci
 def test_splitting_goes_on_after_the_last_level(tmp_path, monkeypatch):
     """Its pilot's plain members alone are run again."""
     went, most, own = [], [np.inf], VehicleWalk.advance
@@ -138,6 +140,7 @@ def test_splitting_goes_on_after_the_last_level(tmp_path, monkeypatch):
     assert answer(split(store=tmp_path / "kept")) == whole
 
 
+@pytest.mark.ci
 def test_a_progress_callback_may_interrupt(tmp_path, ran):
     def stop(fraction):
         if fraction > 0.3:
@@ -155,6 +158,7 @@ def test_a_progress_callback_may_interrupt(tmp_path, ran):
     assert len(ran) == first + rest
 
 
+@pytest.mark.ci
 def test_a_torn_file_is_made_anew(tmp_path, ran):
     whole = answer(rare(store=tmp_path))
     files = sorted(tmp_path.iterdir())
@@ -174,6 +178,7 @@ def test_a_torn_file_is_made_anew(tmp_path, ran):
     assert len(ran) == 1
 
 
+@pytest.mark.ci
 def test_a_store_of_other_arguments_is_refused_before_anything_runs(tmp_path, ran):
     rare(store=tmp_path / "rare")
     estimate(store=tmp_path / "estimate")
@@ -196,6 +201,7 @@ def test_a_store_of_other_arguments_is_refused_before_anything_runs(tmp_path, ra
     says(refused(rare, store=tmp_path), *text)
 
 
+@pytest.mark.ci
 def test_functions_are_told_apart(tmp_path, ran):
     save = lw.SaveAt(at=[1.0])
     bound = 0.35

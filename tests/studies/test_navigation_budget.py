@@ -59,6 +59,7 @@ def biases(members):
 EXACT = dict(rtol=0.0, atol=1e-11)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("current", [0.0, DRIFT])
 def test_with_bottom_lock_the_current_does_not_matter(current):
     members = fleet(current=current)
@@ -72,6 +73,7 @@ def test_with_bottom_lock_the_current_does_not_matter(current):
     np.testing.assert_array_equal(result.navigation_error, result.measured_position - result.position)
 
 
+@pytest.mark.ci
 def test_without_it_the_current_is_the_error():
     result = lw.solve(scene("water_velocity", DRIFT), **RUN, save=SAVE)
     np.testing.assert_allclose(result.navigation_error[-1, 0], [0.0, -DRIFT * T1, 0.0], **EXACT)
@@ -89,6 +91,7 @@ def test_a_log_that_is_lost_for_a_part_of_the_run():
     np.testing.assert_allclose(later.navigation_error[-1, 0], [0.0, -DRIFT * 39.5, 0.0], **EXACT)
 
 
+@pytest.mark.ci
 def test_statistics_during_a_run_keep_no_sample(tmp_path):
     asked = [lw.statistics.Exceedance(ERROR, above=r, name=f"{r:g}") for r in (20.0, 30.0, 40.0)]
     asked += [lw.statistics.Mean("navigation_error"), lw.statistics.Covariance("navigation_error")]
@@ -119,12 +122,14 @@ def test_in_single_precision(dtype):
     assert result.navigation_error.dtype == np.float32
 
 
+@pytest.mark.ci
 def test_its_slope_is_that_of_a_rotation():
     result = lw.solve(scene().with_numbers({"compass.bias": 0.01}), **RUN, tangents=["compass.bias"], save=SAVE)
     slope = D * np.array([-np.sin(0.01), np.cos(0.01), 0.0])
     np.testing.assert_allclose(result.jacobian["navigation_error"][-1, 0, :, 0], slope, rtol=0.0, atol=1e-10)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("r", [30.0, 60.0])
 def test_rare_event_and_estimate_know_the_name(r):
     answer = lw.rare_event(fleet(), f"{ERROR} - {r}", **RUN, relative_error=0.1)
@@ -134,6 +139,7 @@ def test_rare_event_and_estimate_know_the_name(r):
         assert abs(float(found.value) - beyond(r)) < 4.0 * 0.004
 
 
+@pytest.mark.ci
 def test_splitting_follows_it():
     # East: the sum of PACE sin(n), n of each tick by itself, of which the rule takes half of the first and the last.
     sd = PACE * np.sqrt((99 + 0.5) * 0.5 * -np.expm1(-2 * 0.05**2))
@@ -143,6 +149,7 @@ def test_splitting_follows_it():
     assert abs(answer.probability / norm.sf(3.0) - 1.0) < 4.0 * answer.relative_error
 
 
+@pytest.mark.ci
 def test_sensitivity_is_of_the_compass_alone():
     vary = {"compass.bias": lw.distributions.Normal(std=S), "current.velocity[2]": lw.distributions.Normal(std=0.0001)}
     found = lw.uq.sobol(lw.Ensemble(scene(), 1, vary=vary), ERROR, samples=256, **RUN)
@@ -151,6 +158,7 @@ def test_sensitivity_is_of_the_compass_alone():
     assert first["current.velocity[2]"] == pytest.approx(0.0, abs=0.05)
 
 
+@pytest.mark.ci
 def test_a_sweep_asks_for_it_as_a_metric_and_as_a_path():
     metrics = ["navigation end", "navigation largest", "navigation percent", f"max({ERROR})"]
     cases = {"lock": {}, "lost": {"dead_reckoning.start_error": [0.0, 0.0, 60.0]}}
@@ -161,6 +169,7 @@ def test_a_sweep_asks_for_it_as_a_metric_and_as_a_path():
     assert swept.success("lost", swept.cells[1].point)[0] == 0.0
 
 
+@pytest.mark.ci
 def test_the_metric_is_that_of_the_members():
     members = fleet(events=[lw.events.StopTime(at=50.5)])
     kinds = ("end", "largest", "percent")
@@ -175,6 +184,7 @@ def test_the_metric_is_that_of_the_members():
     np.testing.assert_allclose(each["navigation percent"], 100.0 * exact / (0.5 * D), rtol=0.0, atol=1e-11)
 
 
+@pytest.mark.ci
 def test_stores_exports_and_pictures_have_it(tmp_path):
     members = fleet(8)
     whole = lw.solve(members, **RUN, save=SAVE)
@@ -193,6 +203,7 @@ def test_stores_exports_and_pictures_have_it(tmp_path):
     np.testing.assert_array_equal(again.navigation_error[0], half.navigation_error[-1])
 
 
+@pytest.mark.ci
 def test_samples_that_are_asked_for_bring_what_the_quantity_reads():
     save = lw.SaveAt(every=10.0)
     run = lw.prepare(fleet(4), of="max(norm(measured_position - position))", **RUN, save=save)
@@ -202,12 +213,14 @@ def test_samples_that_are_asked_for_bring_what_the_quantity_reads():
     assert "compass.bias -0.1 rad (its lower bound)" in found.answer
 
 
+@pytest.mark.ci
 def test_a_part_of_the_distance_is_refused_where_a_run_goes_on():
     half = lw.solve(fleet(4), **RUN | {"t1": 50.0}, save=GOES_ON)
     with pytest.raises(lw.SceneError, match=r"navigation.of = 'percent' .* goes on from another"):
         lw.solve(fleet(4), **RUN, start=half.final, statistics=[lw.metrics.NavigationError("percent")])
 
 
+@pytest.mark.ci
 def test_the_page_and_the_command_know_the_names(tmp_path, capsys):
     (text,) = blocks("docs/guide/how_far_off.md", "toml")
     path, way, to = tmp_path / "budget.toml", 900.0, ["--out", str(tmp_path / "out"), "--json", "-q"]
@@ -252,6 +265,7 @@ def test_a_scene_that_estimates_no_position_refuses_it(sensors):
         lw.solve(lw.Scene.named("sphere"), **RUN, statistics=[lw.metrics.NavigationError()])
 
 
+@pytest.mark.ci
 def test_a_sensor_of_position_has_the_error_of_its_reading():
     fix = [lw.control.Sensor(of="position", bias=(1.0, -2.0, 0.5))]
     result = lw.solve(scene(sensors=fix), **RUN, save=SAVE)

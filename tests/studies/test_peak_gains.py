@@ -17,6 +17,7 @@ def answer():
     return fleet, lw.linear.margins(fleet, "heading_pid", to=("rotation[2]", "angular_velocity[2]"), **SETTINGS)
 
 
+@pytest.mark.ci
 def test_ten_loops_beside_python_control(answer):
     control = pytest.importorskip("control")
     fleet, peaks = answer
@@ -56,6 +57,7 @@ def test_of_one_component_the_peak_of_s_is_one_over_the_disk_of_skew_one(answer)
     assert peaks.values["sensitivity_peak"] == pytest.approx(1.0 / disk, rel=1e-9)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(("inertia", "delay"), [
     (INERTIAS[0], 0.0), *(pytest.param(*each, marks=pytest.mark.slow) for each in zip(INERTIAS[1:], LATE[1:], strict=True)),
 ])  # fmt: skip

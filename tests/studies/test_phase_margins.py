@@ -58,6 +58,7 @@ def answer():
     return fleet, lw.linear.margins(fleet, "heading_pid", of=("gain", "delay", "phase"), **RUN)
 
 
+@pytest.mark.ci
 def test_ten_loops_beside_python_control_and_eigenvalues(answer):
     control = pytest.importorskip("control")
     fleet, found = answer
@@ -80,6 +81,7 @@ def test_ten_loops_beside_python_control_and_eigenvalues(answer):
         assert found.values["delay"][i] == pytest.approx(phase / at, abs=PERIOD)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(("inertia", "delay"), [
     (INERTIAS[0], 0.0), *(pytest.param(*each, marks=pytest.mark.slow) for each in zip(INERTIAS[1:], LATE[1:], strict=True)),
 ])  # fmt: skip
@@ -106,6 +108,7 @@ def held(stiffness, drag, gain, inertia=5.0):
     return both[first:2, first:2], both[first:2, 2:], np.array([[0.0, -gain]])[:, first:]
 
 
+@pytest.mark.ci
 def test_loops_without_a_crossover_bear_any_phase_and_several_crossovers_have_a_worst():
     rows = [(2.0, 0.0, 4.0), (8.0, 0.0, 4.0), (8.0, 40.0, 4.0), (20.0, 40.0, 1.0)]
     margins = []
@@ -196,6 +199,7 @@ def test_open_loops_for_python_control(loops):
     assert (found.frd(0).omega[-1], space.input_labels, space.output_labels) == (np.pi / PERIOD, ["u_N"], ["y_N"])
 
 
+@pytest.mark.ci
 def test_an_axis_by_itself_and_with_the_others_closed():
     one = turning(INERTIAS[1], 0.06)
     A, B, C = opened(*GAINS, INERTIAS[1], 3)
@@ -211,6 +215,7 @@ def test_an_axis_by_itself_and_with_the_others_closed():
     np.testing.assert_allclose(lw.linear.loop(one, "control_wrench[4]", **RUN).response(w)[0], L, rtol=1e-6)
 
 
+@pytest.mark.ci
 def test_members_without_a_loop_and_what_is_refused():
     states = [
         np.zeros((2, 3)),
@@ -268,6 +273,7 @@ def test_pictures_of_open_loops(loops, tmp_path):
             draw(lost)
 
 
+@pytest.mark.ci
 def test_the_shipped_autopilot_has_margins_and_says_what_they_leave_out():
     shipped = lw.Scene.load("example:remus_100_autopilot")
     fleet = lw.Ensemble.from_scene(shipped).subset([0, 1])

@@ -48,6 +48,7 @@ def answer():
     return lw.rare_event(fleet_of(), f"position[0] - {bound_of(1e-5):.12g}", **RUN)
 
 
+@pytest.mark.ci
 def test_the_probability_of_a_place_is_that_of_a_normal(answer):
     # The step's error, of second order, moves the place by 1e-5 of itself, and the probability by less than 0.1 %.
     assert answer.estimator == "importance"
@@ -125,6 +126,7 @@ def test_ways_to_say_an_event(answer):
     assert of_function.event == "beyond above 0"
 
 
+@pytest.mark.ci
 def test_any_of_several_conditions_is_the_event():
     vary = dict(fleet_of().vary) | {"start.position[1]": lw.distributions.Normal(std=NORTH)}
     limit = {
@@ -147,6 +149,7 @@ def test_any_of_several_conditions_is_the_event():
     assert f"{list(either.by_condition)[1]}: " in str(either)
 
 
+@pytest.mark.ci
 def test_a_condition_that_never_differs_hides_no_other():
     # Nobody moves east, so that half a metre is missing for ever: nearer than most are to the event in their own spreads.
     limit = {"max(position[0])": {"above": bound_of(1e-5)}, "max(position[1])": {"above": 0.5}}
@@ -233,6 +236,7 @@ def test_a_metric_of_an_event_that_is_not_there():
         lw.metrics.Nearest("floor", measured=True)
 
 
+@pytest.mark.ci
 def test_chains_at_a_cheaper_setting(answer):
     limit = f"position[0] - {bound_of(1e-5):.12g}"
     cheap = lw.rare_event(fleet_of(), limit, cheaper=[{"drag.linear[0]": 21.0}], **RUN)
@@ -264,6 +268,7 @@ def test_members_that_fail_are_the_event_and_told_apart():
         lw.rare_event(fleet_of(), lost, failed="refuse", **more)
 
 
+@pytest.mark.ci
 def test_minus_infinity_is_no_member_that_failed():
     def logarithm(result):
         with np.errstate(divide="ignore"):
@@ -283,6 +288,7 @@ def test_minus_infinity_is_no_member_that_failed():
     assert any("every failing member" in message for message in lost.messages)
 
 
+@pytest.mark.ci
 def test_what_moved_is_the_number_that_decides():
     """Gusts push north, and the event is of the depth alone, on both sides: its mean says nothing, nor does the noise."""
     vary = {"start.velocity[2]": lw.distributions.Normal(std=SPEED)}
@@ -314,6 +320,7 @@ def test_what_is_likely_is_sampled():
     assert found.probability == pytest.approx(0.02, abs=4.0 * 0.02 * found.relative_error)
 
 
+@pytest.mark.ci
 def test_noise_is_never_frozen():
     """Chains move the draws of the noise, too: frozen by row, they would meet the same few noises for ever."""
     # White noise S of force: the variance of the place is the integral of (tau (1 - exp(-(T - s) / tau)) S / m)^2.
@@ -333,6 +340,7 @@ def test_noise_is_never_frozen():
     assert (again > bound).all()
 
 
+@pytest.mark.ci
 def test_noise_alone_can_be_the_cause():
     s = np.linspace(0.0, T1, 20_001)
     of_noise = np.trapezoid((TAU * (1.0 - np.exp(-(T1 - s) / TAU)) * 30.0 / (1.5 * float(VEHICLE.mass))) ** 2, s)

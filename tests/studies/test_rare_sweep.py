@@ -101,6 +101,7 @@ def test_rare_failures_are_those_of_the_normal_law(answer):
     assert (rare.failing.own_values()["start.position[2]"] >= FLOOR).any()
 
 
+@pytest.mark.ci
 def test_rare_failures_run_where_the_cells_do(scene, answer):
     class Counting:
         def __init__(self):
@@ -147,6 +148,7 @@ def test_the_sweep_tells_of_them(answer):
     assert pickle.loads(pickle.dumps(answer.rare("near"))).probability == near["rare"]
 
 
+@pytest.mark.ci
 def test_files_of_rare_failures_are_found_again(scene, folder, answer, tmp_path):
     pytest.importorskip("matplotlib")
     names = {path.name for path in answer.save(folder)}
@@ -184,6 +186,7 @@ def test_absent_nothing_is_told(scene):
     assert "rare.png" not in pictures(plain)
 
 
+@pytest.mark.ci
 def test_one_member_and_the_same_case_twice(scene):
     cases = [{"name": "one"}, {"name": "two"}, {"name": "not", "rare": False}]
     alone = swept(scene, cases=cases, members=1, rare={"relative_error": 0.3})
@@ -195,6 +198,7 @@ def test_one_member_and_the_same_case_twice(scene):
     assert "rare" not in alone.rows()[2]
 
 
+@pytest.mark.ci
 def test_what_always_or_never_fails_is_told_and_the_others_go_on(scene):
     """The bounds of success are one for all: cases are here and there by what they want."""
     far = {"guidance": [{"type": "set_point", "position": [100.0, 0.0, 0.0], "heading": 1.0}]}
@@ -238,6 +242,7 @@ def test_what_is_asked_wrongly_gets_one_sentence(scene, more, words):
     assert words in str(error.value)
 
 
+@pytest.mark.ci
 def test_the_command(tmp_path, capsys):
     text = """
 scene = "scene.toml"

@@ -104,6 +104,7 @@ run = { method = "psi_x", step = 0.1, duration = 2.0 }
 """
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(("verb", "words"), [
     # A neutral body moves on: the depth is v t.
     ("run", "The member ends ok at 2 s."),

@@ -103,6 +103,7 @@ SAVE = lw.SaveAt(every=PERIOD, fields=("position", "attitude", "velocity", "angu
 STARTS = {"start.position[2]": lw.distributions.Normal(std=1.0), "start.velocity[2]": lw.distributions.Normal(std=0.5)}
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("risk", ["mean", lw.metrics.CVaR(0.2)], ids=str)
 def test_tuned_gains_are_those_of_the_regulator(regulator, risk):  # noqa: F811
     """The regulator's gains are the best from every start, so whatever the risk is."""

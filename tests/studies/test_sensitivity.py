@@ -232,6 +232,7 @@ def test_a_joint_law_is_one_factor_of_a_screening(sinking):
     assert np.isfinite(found.mu_star).all()
 
 
+@pytest.mark.ci
 def test_noise_that_acts_alike_belongs_to_no_factor(sinking):
     noisy = dataclasses.replace(sinking, terms=[lw.terms.WrenchNoise(force=(1.0, 1.0, 1.0), torque=(0.0, 0.0, 0.0))])
     vary = {"vehicle.buoyancy": Normal(std=1.0), "environment.water_density": Normal(std=1.0)}
@@ -248,6 +249,7 @@ HEAVIER = {"vehicle.mass": np.linspace(123.0, 125.0, 40)}
 LINES = np.random.default_rng(0).uniform(0.01, 0.99, (40, 3))
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     "sampling",
     ["random", "sobol", "halton", {"latin_hypercube": {"group": 20}}, "saltelli", "morris",
@@ -267,6 +269,7 @@ def test_a_member_runs_again_alone_with_its_bits(sinking, sampling):
     np.testing.assert_array_equal(lw.solve(back, **SINK).position, whole[:, [7, 2]])
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     "sampling", ["random", "sobol", "halton", {"latin_hypercube": {"group": 20}}, "saltelli", "morris"], ids=str
 )
@@ -319,6 +322,7 @@ def test_a_quantity_that_is_not_finite_is_a_failure(scene):
     assert "quantity not finite" in message
 
 
+@pytest.mark.ci
 def test_members_that_reach_the_surface_count_with_where_they_arrive():
     """Neutral bodies that rise at their own speeds: at t1 each is where it is, or has been stopped at the surface."""
     body = lw.Vehicle(20.0, inertia=(1.0, 1.2, 1.4), added_mass=(10.0, 10.0, 10.0), buoyancy=20.0 * 9.8)

@@ -337,6 +337,7 @@ def test_noise_and_numbers_are_both_moved(answer):
     assert len(answer.runs) % 16 == 0
 
 
+@pytest.mark.ci
 def test_a_failing_path_is_run_again(answer):
     assert len(answer.paths) == len(answer.weights) > 100
     levels = ndtr(answer.normals)
@@ -374,6 +375,7 @@ def test_failing_members_have_starts_of_their_own(answer):
     assert not any("different starts" in message for message in answer.messages)
 
 
+@pytest.mark.ci
 def test_the_same_seed_has_the_same_answer():
     limit = f"position[0] - {place_of(1e-2):.12g}"
     first, again, other = (
@@ -501,6 +503,7 @@ def test_an_event_that_stops_members():
     assert found.event == "wall"
 
 
+@pytest.mark.ci
 def test_members_that_fail_are_the_event_and_told_apart():
     bound = place_of(1e-2)
 

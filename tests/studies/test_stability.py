@@ -33,6 +33,7 @@ def number(answer):
     return answer.y.values[:, None] * answer.x.values
 
 
+@pytest.mark.ci
 def test_beyond_the_solvable_step_every_cell_is_flagged(answer):
     # h |J^-1 pi| = 2 for psi_s; a little less, since weight and Munk moment spin some starts up, or down by h |Om| / 2.
     beyond = number(answer) > 2.0 * 1.2
@@ -84,6 +85,7 @@ def test_classes_and_numbers_agree(answer):
     assert (answer.unverified, answer.judged) == (0, "conservative")
 
 
+@pytest.mark.ci
 def test_errors_are_those_of_a_run_of_its_own(answer, scene):
     """One cell again by lw.solve: the error against a step 16 times shorter of a method of order 8."""
     i, j = 2, 2
@@ -101,6 +103,7 @@ def test_errors_are_those_of_a_run_of_its_own(answer, scene):
     assert 1e-5 < angle <= answer.errors["psi_s"][i, j] * 1.001
 
 
+@pytest.mark.ci
 def test_the_reference_is_verified_by_another(scene):
     grid = StabilityGrid(scene, ("h", 0.05, 0.2), ("angular_velocity", 1.0, 8.0), (2, 2), 1, 0, None)
     columns = [column(h, members, 1.0, 1.0) for h, members in grid.columns()]
@@ -135,6 +138,7 @@ def test_the_worst_status_is_of_a_failure_before_an_event(scene):
     assert stability.worst_status(grid, status).tolist() == [[3, 16], [255, 0]]
 
 
+@pytest.mark.ci
 def test_the_same_for_any_number_of_threads(scene):
     maps = [lw.stability_map(scene, ("h", 0.05, 1.0), ("angular_velocity", 1.0, 4.0), ["psi_s"], points=3, t1=4.0,
                              error_time=1.0, threads=n) for n in (1, 3)]  # fmt: skip
@@ -142,6 +146,7 @@ def test_the_same_for_any_number_of_threads(scene):
     assert np.array_equal(maps[0].energies["psi_s"], maps[1].energies["psi_s"])
 
 
+@pytest.mark.ci
 def test_progress_rises_to_one(scene):
     seen = []
     lw.stability_map(scene, ("h", 0.05, 1.0), ("angular_velocity", 1.0, 4.0), ["psi_s"], points=2, t1=4.0,
@@ -151,6 +156,7 @@ def test_progress_rises_to_one(scene):
     assert len(seen) > 2
 
 
+@pytest.mark.ci
 def test_a_step_on_no_axis(scene):
     one = lw.stability_map(scene, ("speed", 0.1, 2.0), ("angular_velocity", 1.0, 4.0), ["psi_s"], points=(3, 2), t1=4.0,
                            error_time=1.0, h=0.01)  # fmt: skip
@@ -206,6 +212,7 @@ def test_a_method_that_the_scene_refuses_is_named(scene):
         lw.stability_map(damped, ("h", 0.05, 1.0), "angular_velocity", ["gauss4"], points=2, t1=1.0, error_time=0.5)
 
 
+@pytest.mark.ci
 def test_a_picture_of_linear_axes_and_of_one_row(scene, tmp_path):
     axes = "angular_velocity=1:4:linear", "h=0.05:1"
     for points in ((3, 2), (3, 1)):
@@ -214,6 +221,7 @@ def test_a_picture_of_linear_axes_and_of_one_row(scene, tmp_path):
         assert (tmp_path / "one.png").stat().st_size > 5000
 
 
+@pytest.mark.ci
 def test_the_command(tmp_path, capsys):
     arguments = ["--x", "h=0.02:2", "--y", "angular_velocity", "--methods", "psi_s", "--points", "5", "--duration", "8"]
     assert cli.main(["stability", PAPER, "--out", str(tmp_path), *arguments, "--seed", "3"]) == 0
@@ -239,6 +247,7 @@ def test_a_bad_argument_is_refused_with_the_remedy(arguments, words, tmp_path, c
     assert "Traceback" not in text
 
 
+@pytest.mark.ci
 def test_a_map_of_whatever_statistics_know(scene):
     """A depth's error is that of the position at most: where the position is accurate, it is."""
     axes = ("h", 0.02, 0.5), ("angular_velocity", 0.5, 5.0)

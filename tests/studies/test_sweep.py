@@ -77,6 +77,7 @@ def found(scene):
     return swept(scene)
 
 
+@pytest.mark.ci
 def test_a_case_that_is_refused_is_noted_and_the_others_go_on(found):
     rows = found.rows()
     assert [row["case"] for row in rows] == [name for name in ("soft", "stiff", "unknown") for _ in range(2)]
@@ -183,6 +184,7 @@ def files_of(folder):
     }
 
 
+@pytest.mark.ci
 def test_a_sweep_that_was_stopped_goes_on_with_the_same_bytes(scene, tmp_path, found):
     class StopError(Exception):
         pass
@@ -248,6 +250,7 @@ def test_members_that_fail_do_not_pass_and_come_first(scene):
     assert row["failed"] == row["way missing"] == lost.sum()
 
 
+@pytest.mark.ci
 def test_the_command_writes_everything(scene, tmp_path, capsys):
     text = """
 scene = "scene.toml"

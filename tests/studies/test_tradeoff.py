@@ -55,6 +55,7 @@ def answer(scene):
     return lw.tradeoff(fleet, 4.0, methods=METHODS, seconds=ENOUGH)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("of", ["position", "attitude"])
 @pytest.mark.parametrize("kind", tradeoffs.KINDS)
 def test_the_front_is_monotone_and_nothing_beats_it(answer, of, kind):
@@ -84,6 +85,7 @@ def test_errors_scale_with_the_order(answer, method, order, least):
     assert abs(slope - order) < 0.3
 
 
+@pytest.mark.ci
 def test_the_reference_is_the_truth(answer, scene):
     sample = Sample(scene, 4.0)
     reference = make_reference(sample, seconds=ENOUGH)
@@ -106,6 +108,7 @@ def test_one_cost_a_step_for_each_kernel(answer):
     assert bool(doubtful) == any("readings of cost disagree" in message for message in answer.messages)
 
 
+@pytest.mark.ci
 def test_cpu_time_is_that_of_the_run(scene):
     """Also where the run is asked for by the main thread: a hundred thousand times the steps take longer."""
     sample = Sample(scene, 4.0, 8)
@@ -116,6 +119,7 @@ def test_cpu_time_is_that_of_the_run(scene):
     assert predicted[1] > 5.0 * predicted[0]
 
 
+@pytest.mark.ci
 def test_errors_of_whatever_statistics_know(scene, tmp_path):
     of = "depth"
     fleet = lw.Ensemble(scene, 8, 1, scene.ensemble_settings.vary)
@@ -198,6 +202,7 @@ def test_steps_near_the_front_are_between_those_tried_first(answer):
     assert any(np.any(np.abs(np.log2(ratio) - np.log2(ratio).round()) > 0.2) for ratio in ratios)
 
 
+@pytest.mark.ci
 def test_biases_shrink_with_the_step_and_are_one_for_other_members(scene):
     fleet = lw.Ensemble(scene, 64, 1, scene.ensemble_settings.vary)
     sample = Sample(fleet, 4.0)
@@ -300,6 +305,7 @@ def test_events_end_what_is_compared(scene, tmp_path):
     assert (tmp_path / "one.png").stat().st_size > 10_000
 
 
+@pytest.mark.ci
 def test_time_that_is_up_leaves_the_first_method(scene):
     # As on a busy machine, where the reference's kernels alone take longer to compile than the whole is to take.
     found = lw.tradeoff(lw.Ensemble(scene, 8, 1), 4.0, methods=METHODS, seconds=1e-6)
@@ -404,6 +410,7 @@ def test_bad_arguments_are_refused_with_the_remedy(scene, arguments, words):
     assert all(word in str(caught.value) for word in words)
 
 
+@pytest.mark.ci
 def test_the_command_writes_files_that_load_again(tmp_path, capsys):
     options = ["--methods", "su4(psi_x)", "--seconds", str(ENOUGH)]
     assert cli.main(["tradeoff", PAPER, "--out", str(tmp_path), *SHORT, *options]) == 0
@@ -432,6 +439,7 @@ def test_the_command_writes_files_that_load_again(tmp_path, capsys):
     assert all(third.std() > 0.05 for third in np.array_split(picture[..., :3], 3, axis=1))
 
 
+@pytest.mark.ci
 def test_run_with_an_error_chooses_and_checks(tmp_path, capsys):
     options = ["--error", "1e-4", "--of", "attitude", "--method", "psi_s"]
     assert cli.main(["run", PAPER, "--out", str(tmp_path), *SHORT, *options]) == 0

@@ -48,6 +48,7 @@ def by_brute_force(fleet, count):
     return gains, costs, np.where(np.isnan(margins).any(axis=1), -1.0, margins.min(axis=1))
 
 
+@pytest.mark.ci
 def test_the_best_gains_of_a_disk_margin_beside_brute_force():
     fleet = turned()
     assert len(np.unique(fleet.parameters(0, 3)["controller.delay"])) > 1
@@ -76,6 +77,7 @@ def test_the_best_gains_of_a_disk_margin_beside_brute_force():
     assert found.runs <= 3 * 100 + 12 + 3
 
 
+@pytest.mark.ci
 def test_metrics_margins_and_quantities_at_once_and_none_that_fit():
     fleet, save = turned(), lw.SaveAt(every=0.5)
     bounds = ["overshoot heading below 0.02", "gain_upper heading_pid above 4", "max(norm(angular_velocity)) below 0.2"]

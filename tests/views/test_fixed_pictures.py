@@ -22,6 +22,7 @@ def check(recorded, shown):
     assert not faults, "\n".join([*faults[:20], remedy])
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("name", PICTURES)
 def test_a_picture_shows_what_it_showed(name):
     check(KNOWN["pictures"][name], fixed_pictures.picture(name))

@@ -146,6 +146,7 @@ def texts(figure):
     return [text for text in figure.findobj(Text) if text.get_visible() and text.get_text().strip()]
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("name", NAMES)
 def test_nothing_is_cut_off(drawn, name):
     figure = drawn[name]

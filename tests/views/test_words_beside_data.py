@@ -25,6 +25,7 @@ def unread_of(result):
     return {name: found for name, figure in (drawn | {"fan of yaw": angle}).items() if (found := unread(figure))}
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("name", QUICK)
 def test_words_stand_beside_data(name):
     assert unread_of(RUNS[name]()) == {}
@@ -59,6 +60,7 @@ def station():
     return made(position, time)
 
 
+@pytest.mark.ci
 def test_numbers_that_hardly_differ_have_ticks_that_can_be_read():
     assert unread_of(station()) == {}
 

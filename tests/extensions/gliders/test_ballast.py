@@ -50,6 +50,7 @@ def fallen(volume, t, speed):
     return 10.0 + speed * t + (t - at) @ pull, speed + pull.sum()
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_a_pump_follows_its_schedule():
     # Kinks at whole seconds: rk4 is exact for forces that are linear in time, and no step crosses one.
@@ -59,6 +60,7 @@ def test_a_pump_follows_its_schedule():
     np.testing.assert_allclose(result.velocity[-1, 0, 2], speed, rtol=0.0, atol=1e-13)
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_two_ballasts_at_once_are_their_sum():
     half = {"times": STEPS["times"], "command_schedule": 0.5 * np.array(STEPS["command_schedule"])}
@@ -71,6 +73,7 @@ def test_two_ballasts_at_once_are_their_sum():
     np.testing.assert_allclose(depths(parts), depths(whole), rtol=0.0, atol=1e-13)
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_a_volume_stays_within_its_limit():
     held = lw.solve(falling(lw.terms.Ballast(command=[5e-4], limit=[2e-4])), "psi_s", h=0.1, t1=4.0)
@@ -127,6 +130,7 @@ def test_a_schedule_keeps_the_order(method, order):
     assert abs(slope(steps, errors) - order) < 0.2
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_a_constant_volume_conserves_energy():
     # As much buoyancy as weight: so it does not gain speed for ever.
@@ -158,6 +162,7 @@ def turned_at_bottom(t, speed, bottom=12.0):
     return depth - 0.5 * pull * PUMP["volume_up"] * rest**2, speed - lost - pull * PUMP["volume_up"] * rest
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 @pytest.mark.parametrize("carried", [0.0, 0.2], ids=["still", "carried"])
 @pytest.mark.parametrize("method", ["psi_s", "rk4"])
@@ -209,6 +214,7 @@ def cycles(begun, t1):
     return y
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 @pytest.mark.parametrize("method", ["psi_s", "rk4"])
 def test_dives_and_climbs_have_order_2(method):
@@ -222,6 +228,7 @@ def test_dives_and_climbs_have_order_2(method):
     assert errors[-1] < 1e-4
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 @pytest.mark.parametrize("method", ["psi_s", "rk4"])
 def test_a_step_over_both_depths_turns_at_the_one_ahead(method):
@@ -237,6 +244,7 @@ def test_a_step_over_both_depths_turns_at_the_one_ahead(method):
     np.testing.assert_allclose(depths(up) - 10.0, 10.0 - depths(mirrored), rtol=0.0, atol=1e-13)
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_a_start_beyond_the_bottom_turns_at_once():
     deep = lw.solve(falling(engine(volume_down=0.0, volume_start=0.0), depth=13.0), "rk4", h=0.5, t1=4.0)
@@ -253,6 +261,7 @@ def fleet_of(numbers):
     return one(falling(engine()), b=(0.0, 0.0, 10.0), parameters=parameters)
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_members_have_engines_of_their_own():
     result = lw.solve(fleet_of(OWN), "psi_s", h=0.1, t1=40.0)
@@ -261,6 +270,7 @@ def test_members_have_engines_of_their_own():
         np.testing.assert_allclose(depths(result)[:, i], depths(alone)[:, 0], rtol=0.0, atol=1e-13)
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 @pytest.mark.slow_for("*float32")
 @pytest.mark.parametrize("dtype", ["float64", "float32"])
@@ -302,6 +312,7 @@ def neutral_depth(volume):
     return NEUTRAL + roots[np.argmin(np.abs(roots))]
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 @pytest.mark.parametrize("volume", [0.0, 3e-6, -3e-6])
 def test_a_hull_that_yields_rests_at_archimedes_depth(volume):
@@ -322,6 +333,7 @@ def test_a_hull_that_yields_rests_at_archimedes_depth(volume):
     np.testing.assert_allclose(depths(half)[-1, 0] - depth, -size, rtol=1e-3)
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_an_engine_lifts_more_in_denser_water():
     # x'' = -k (1 + gradient x), k = rho g V / M: a harmonic motion about where the water would weigh nothing.
@@ -333,6 +345,7 @@ def test_an_engine_lifts_more_in_denser_water():
     np.testing.assert_allclose(depths(result)[-1, 0] - 12.0, x, rtol=0.0, atol=1e-7)
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_the_density_counts_once():
     # A hull that yields as the water grows dense is neutral at all depths, but for the product of both.
@@ -342,6 +355,7 @@ def test_the_density_counts_once():
     np.testing.assert_allclose(depths(result)[-1, 0] - NEUTRAL - 100.0, 0.5 * force / (MASS + ADDED) * 100.0, rtol=1e-6)
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_stages_remember_what_those_of_the_twin_do():
     # 40 steps of round-off 1e-15 and little growth; the schedule turns.
@@ -350,6 +364,7 @@ def test_stages_remember_what_those_of_the_twin_do():
     assert difference(*test_explicit.both(scene, body, "rk4", 0.02, 40)) < 2e-12
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_stages_of_an_engine_are_near_those_of_the_twin():
     # The twin looks from the step's start to each stage, the kernel from stage to stage: they part at a turn, to order 2.

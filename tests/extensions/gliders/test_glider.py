@@ -125,6 +125,7 @@ def test_the_named_vehicle_has_its_battery_where_it_is_level():
     np.testing.assert_allclose(vehicle.center_of_gravity, level.first / (HULL + BATTERY), rtol=0.0, atol=1e-9)
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 @pytest.mark.parametrize(("ahead", "net"), [(0.4216, 0.3), (0.38, -0.3)], ids=["dive", "climb"])
 def test_a_steady_glide_follows_from_algebra(ahead, net):
@@ -156,6 +157,7 @@ def against_another_integrator(scene, body, t1):
     return result.velocity[-1, 0], result.attitude[-1, 0, 2], result.angular_velocity[-1, 0]
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_a_spiral_of_400_s():
     steady_spiral = steady(SPIRAL, GUESS)
@@ -202,6 +204,7 @@ def test_the_slocum_has_the_lift_and_drag_of_its_source():
     np.testing.assert_allclose(got, 0.5 * DENSITY * 0.1 * slopes, rtol=1e-14)
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 @pytest.mark.parametrize(("pitch", "net", "attack", "speed"), GLIDES)
 def test_the_slocum_glides_as_published(pitch, net, attack, speed):
@@ -215,6 +218,7 @@ def test_the_slocum_glides_as_published(pitch, net, attack, speed):
     np.testing.assert_allclose([np.arctan2(w, u), np.arctan2(-R[2, 0], R[2, 2])], [attack, pitch], rtol=0.0, atol=1e-6)
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_the_slocum_spirals_as_algebra_and_another_integrator_say():
     turned, x = np.deg2rad(20.0), 0.036

@@ -174,6 +174,7 @@ def piece(path, begin, stop):
 KNOWN = by_forces(PATH, 2.4)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     ("method", "order"), [("rk4", 4.0), ("rkw3", 3.0), pytest.param("rkmk4", 4.0, marks=pytest.mark.slow)]
 )
@@ -286,6 +287,7 @@ def test_numbers_of_each_member():
     assert difference(last(single, 1), last(whole, 1)) < 1e-4
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("at", [0.8, pytest.param(1.15, marks=pytest.mark.slow)])
 def test_going_on_in_the_middle_of_a_move(at):
     fleet = one(damped(lw.terms.MovingMass(**PATH)), **STATE)
@@ -336,6 +338,7 @@ def test_momenta_and_energy_of_results(tmp_path):
     np.testing.assert_allclose(lw.Result.load(tmp_path / "slid.npz").energy[:, 0], known, atol=1e-15)
 
 
+@pytest.mark.ci
 def test_energy_of_its_weight():
     # Hung up where it is: 9 kg at 10 cm below its reference place, whatever its inertia.
     for inertia in (True, False):

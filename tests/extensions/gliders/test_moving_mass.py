@@ -18,6 +18,8 @@ from lgvi_warp.reference.terms.drag import Drag
 from tests.support.loops import twin_body, twin_run
 from tests.support.tools import difference, last, one, slope
 
+pytestmark = pytest.mark.ci
+
 GRAVITY, MASS, BATTERY = 9.8, 50.0, 9.0
 # Neutral, its center of buoyancy 2 cm above that of gravity.
 VEHICLE = lw.Vehicle(

@@ -42,6 +42,7 @@ def worked(scene, method, h, t1, **settings):
 RISE = PUMP["volume_up"] - PUMP["volume_down"]
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 @pytest.mark.parametrize("method", ["psi_s", "rk4", pytest.param("rk8", marks=pytest.mark.slow),
                                     pytest.param("rkmk4", marks=pytest.mark.slow)])  # fmt: skip
@@ -54,6 +55,7 @@ def test_at_a_held_depth_it_is_pressure_times_volume(method):
     assert worked(falling(ACCOUNT, letting_in, vehicle=ANCHORED), method, 0.4, 12.0)[0] == pytest.approx(0.0, abs=1e-11)
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_going_down_it_is_the_closed_integral():
     # From the bottom on at 0.31 m/s: p dV goes straight, and its mean is that of the middle of the 7.5 s.
@@ -64,6 +66,7 @@ def test_going_down_it_is_the_closed_integral():
         assert worked(scene, "rk4", 0.1, 20.0)[0] == pytest.approx(exact, rel=1e-10)
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_in_denser_water_the_pressure_is_that_of_all_water_above():
     # By a sum over thin layers of water.
@@ -75,6 +78,7 @@ def test_in_denser_water_the_pressure_is_that_of_all_water_above():
     assert worked(falling(ACCOUNT, dense, vehicle=ANCHORED), "rk4", 0.4, 12.0)[0] == pytest.approx(exact, rel=1e-10)
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_above_the_surface_it_takes_nothing():
     high = engine(first="up", volume_start=-1e-4, depth_top=-9.0)
@@ -104,6 +108,7 @@ def work_of_a_dive(begun, t1):
     return climb.y[3, -1]
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 @pytest.mark.parametrize("method", ["psi_s", "rk4"])
 def test_of_a_body_that_turns_it_has_order_2(method):
@@ -116,6 +121,7 @@ def test_of_a_body_that_turns_it_has_order_2(method):
     assert errors[-1] < 1e-4 * truth.max()
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 @pytest.mark.parametrize("method", ["psi_s", "rk4"])
 def test_the_kernel_uses_what_its_twin_uses(method):
@@ -137,6 +143,7 @@ def test_the_kernel_uses_what_its_twin_uses(method):
     assert used == pytest.approx(x.used, rel=1e-12 if method == "psi_s" else 1e-4)
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 @pytest.mark.parametrize("method", ["psi_s", "rk4"])
 def test_the_motion_keeps_its_bits_and_a_run_goes_on(method):
@@ -151,6 +158,7 @@ def test_the_motion_keeps_its_bits_and_a_run_goes_on(method):
     assert HOTEL * 15.0 < first.energy_used[-1, 0] < whole.energy_used[-1, 0] - HOTEL * 9.0
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_without_an_efficiency_the_account_knows_nothing_of_it():
     assert worked(falling(ACCOUNT, engine(efficiency=None)), "rk4", 0.1, 24.0)[0] == pytest.approx(0.0, abs=1e-11)
@@ -185,6 +193,7 @@ def test_an_efficiency_is_above_0_and_at_most_1():
         says(refused(engine, efficiency=value), "efficiency")
 
 
+@pytest.mark.ci
 def test_the_check_of_a_law_and_a_table_keep_the_pump():
     report = lw.laws.check_law(engine())
     assert report.ok, str(report)
@@ -204,6 +213,7 @@ def tanks(**numbers):
     )
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 @pytest.mark.parametrize("method", ["psi_s", "rk4", pytest.param("rk8", marks=pytest.mark.slow)])
 def test_ballast_pumps_against_the_pressure_at_its_points(method):
@@ -259,6 +269,7 @@ def test_a_controller_that_fills_ballast_pays_for_it():
     assert work > 1.0
 
 
+@pytest.mark.ci
 def test_the_check_of_ballast_with_pumps():
     for numbers in ({}, {"rate_limit": 2e-5}):
         report = lw.laws.check_law(tanks(**numbers))

@@ -10,6 +10,8 @@ from tests.extensions.gliders.cases import STRATIFICATION
 from tests.laws.test_water import scene
 from tests.support.tools import one, random_states, slope
 
+pytestmark = pytest.mark.ci
+
 
 def test_oscillation_in_stratified_water():
     # Upright, the centre of buoyancy is at d0 + A cos(omega t), omega^2 = B gradient / M33.

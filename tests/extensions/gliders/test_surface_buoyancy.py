@@ -58,6 +58,7 @@ def draught(section, share):
     return brentq(lambda d: below(section, d) / area - share, -0.5 * HEIGHT, 0.5 * HEIGHT, xtol=1e-14)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("section", ["box", "circle"])
 @pytest.mark.parametrize("share", [0.25, pytest.param(0.8, marks=pytest.mark.slow)])
 def test_a_hull_comes_to_rest_at_archimedes_depth(section, share):
@@ -77,6 +78,7 @@ def oscillation(scene, omega, kick, h):
     return last(lw.solve(one(scene, **kick), "rk8", h=t1 / steps, t1=t1))
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("section", ["box", "circle"])
 def test_it_bobs_at_the_frequency_of_its_waterplane(section):
     # omega^2 = rho g A_w / M33.
@@ -98,6 +100,7 @@ def metacentric_height(section, share):
     return breadth_of(section, d) * LENGTH**3 / 12.0 / volume - (ABOVE + keel_to_middle)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("section", ["box", "circle"])
 def test_it_pitches_at_the_frequency_of_its_metacentre(section):
     # omega^2 = W GM / (J + A55).
@@ -155,6 +158,7 @@ def energies(scene, method, h, t1, state=WILD):
     return result.time, result.energy[:, 0] - result.energy[0, 0], result
 
 
+@pytest.mark.ci
 def test_psi_s_keeps_the_energy_over_hundreds_of_leaps():
     scene = floating("circle")
     time, error, result = energies(scene, "psi_s", 0.005, 300.0)
@@ -178,6 +182,7 @@ def wet_and_dry(section):
     return floating(section), {"b": (0.0, 0.0, -ABOVE), "nu": (0.0, 0.0, 0.1), "Om": (0.0, 0.05, 0.0)}
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(("method", "order"), [("psi_s", 2.0), ("rk4", 4.0)])
 @pytest.mark.parametrize("section", ["circle", pytest.param("box", marks=pytest.mark.slow)])
 def test_orders_between_wet_and_dry(section, method, order):
@@ -188,6 +193,7 @@ def test_orders_between_wet_and_dry(section, method, order):
     assert slope(steps, errors) == pytest.approx(order, abs=0.2)
 
 
+@pytest.mark.ci
 def test_rk4_loses_energy_by_its_order():
     # Bobbing and pitching of finite size: the error of each step is of order 5, in one direction.
     scene, state = wet_and_dry("circle")
@@ -209,6 +215,7 @@ def across_the_surface(section, method, steps):
 STEPS = 0.03 * 0.5 ** np.arange(6)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(("section", "order"), [("box", 2.0), ("circle", 2.5)])
 def test_orders_across_the_kink(section, order):
     # The slope of the force by depth jumps at the box, and is a square root at the circle: rk4 keeps 2, and 2.5.
@@ -221,6 +228,7 @@ def test_psi_s_keeps_its_order_across_the_kink(section):
     assert slope(STEPS, across_the_surface(section, "psi_s", STEPS)) > 1.85
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("added", [0.0, 45.0])
 def test_it_flies_while_it_is_dry(added):
     # Ballistic, with the water that the model still carries along: W / (m + A33). Parabolas are exact for rk4.
@@ -254,6 +262,7 @@ def response(scene, wave, d):
     return (stiffness - inertia * omega**2 * decayed) / (stiffness - inertia * omega**2), decayed
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("period", [12.0, 2.2])
 def test_a_body_follows_waves(period):
     wave = lw.terms.Waves(amplitudes=[1e-4], periods=[period], headings_deg=[0.0])
@@ -318,6 +327,7 @@ def test_slopes_by_its_numbers():
     assert not np.any(slopes[:, 0])
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("section", ["circle", pytest.param("box", marks=pytest.mark.slow)])
 def test_waves_in_axes_that_are_not_the_users(section):
     # Ten steps of a hull of parts below waves, whose axes of inertia are none of its own, beside the twin.
@@ -377,6 +387,7 @@ def test_an_autopilot_that_climbs_stays_in_the_water():
     assert np.all(np.abs(depths[1]) < 0.191)
 
 
+@pytest.mark.ci
 def test_a_floating_vehicle_is_not_odd():
     # Lighter than half of its water, above the surface on its way: without this term that is worth a message.
     scene = floating("box")

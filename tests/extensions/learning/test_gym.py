@@ -80,6 +80,7 @@ def test_what_is_no_real_number_is_refused(env, odd, words):
             other.step(actions)
 
 
+@pytest.mark.ci
 def test_members_that_come_again_have_other_noise():
     """Three given members, two environments: each member's first episode has its own noise, each later one new noise."""
     part = lw.Ensemble(

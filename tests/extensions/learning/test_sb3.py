@@ -180,6 +180,7 @@ def test_angles_and_rotations_have_bounds():
     assert low == [-each for each in high]
 
 
+@pytest.mark.ci
 @pytest.mark.slow_for("float32")
 @pytest.mark.parametrize("dtype", ["float64", "float32"])
 def test_what_is_seen_lies_within_its_bounds(dtype):

@@ -58,6 +58,7 @@ def still(ticks):
 CASES = {"many in a row": (3.0, 2.0, 0.3), "by sensor": ((4.0, 2.0, np.inf, 3.0, 2.5), 10.0, 0.1)}
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("case", CASES)
 def test_a_gated_filter_is_its_twin(case):
     # Many rejections in a row: the covariance is widened, too. Three fixes are on their way, and the tilt is up to 0.18 rad.
@@ -83,6 +84,7 @@ KNOWN = dict.fromkeys(
 )
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(("gate", "share"), [(3.0, 2.699796e-3), (2.0, 4.550026e-2)])
 def test_a_gate_rejects_the_tails_of_a_normal_distribution(gate, share):
     # Where the state is known each innovation is a normal number by itself: what is rejected leaves no error behind.
@@ -96,6 +98,7 @@ def test_a_gate_rejects_the_tails_of_a_normal_distribution(gate, share):
     assert np.all((low <= rejected.sum(axis=1)) & (rejected.sum(axis=1) <= high))
 
 
+@pytest.mark.ci
 def test_with_a_gate_outliers_are_readings_that_are_lost():
     members, truth = 300, voyage(200)
     noises = {"dvl": 0.01, "cell": 0.02, "compass": 0.02, "gps": 1.0, "usbl": 0.5}
@@ -114,6 +117,7 @@ def test_with_a_gate_outliers_are_readings_that_are_lost():
     assert square[2] > 1.5 * square[1]
 
 
+@pytest.mark.ci
 def test_a_filter_that_was_shut_out_finds_back():
     # It believes that it knows its place to 0.1 m, and is 50 m off: each fix is beyond the gate.
     sigmas = {"position_sigma": 0.1, "velocity_sigma": 1e-5, "attitude_sigma": 1e-6, "start_error": 500.0}
@@ -129,6 +133,7 @@ def test_a_filter_that_was_shut_out_finds_back():
     assert np.median(off[np.inf]) > 20.0
 
 
+@pytest.mark.ci
 def test_three_fixes_on_their_way_are_those_of_a_straight_line():
     # As of one fix on its way in test_navigation.py: a regression on fixes, each at the time at which it was taken.
     place, velocity, noise, members, late, every = 3.0, 0.2, 0.5, 300, 12, 5
@@ -194,6 +199,7 @@ def test_bad_numbers_are_told(name):
     assert re.search(text, str(found.value))
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("more", [(), ("measured_position",)], ids=["alone", "beside what is measured"])
 def test_each_reading_is_taken_or_rejected_once(more):
     """Beams at every second tick and depths at each, of a run; what is saved beside changes no count."""

@@ -56,6 +56,7 @@ def free():
     return ran(statistics=[lw.metrics.Rejected(then=[lw.statistics.MemberValues()])])
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_a_member_ends_at_the_tick_at_which_its_filter_is_too_unsure(free):
     sigma = np.linalg.norm(free.estimate_sigma[..., :3], axis=-1)

@@ -75,6 +75,7 @@ def test_estimates_are_the_twins_over_ten_minutes():
     assert np.abs(single[:, 1] - wanted)[:, :3].max() < 1e-4
 
 
+@pytest.mark.ci
 def test_a_log_and_a_gyroscope_without_a_filter_are_the_twins():
     rough = {"dropout": 0.3, "burst": 3.0, "outlier": 0.1, "outlier_std": 0.5, "silent_from": 20.0, "silent_to": 25.0}
     listed = [lw.control.DVL(**LOG | rough), lw.control.IMU(**UNIT)]
@@ -87,6 +88,7 @@ def test_a_log_and_a_gyroscope_without_a_filter_are_the_twins():
     assert np.array_equal(seen[200:249, :, 12:15], seen[201:250, :, 12:15])
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     "lost",
     [{"silent_from": 0.0, "silent_to": 5.0}, {"dropout": 1.0}, {"floor": "ground", "greatest_range": 2.0}],
@@ -270,6 +272,7 @@ def allan_of(noise, walk, m):
     return noise**2 / (m * PERIOD) + walk**2 * PERIOD * (2 * m**2 + 1) / (6 * m)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("which", ["gyroscope", "accelerometer"])
 def test_the_allan_deviation_is_as_set(which):
     noise, walk, ticks, members = 1e-3, 2e-3, 1200, 60
@@ -313,6 +316,7 @@ def test_a_beam_whose_way_to_the_floor_is_beyond_its_range_has_no_echo():
     assert known == [0, 2]
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("reach", [9.0, np.inf])
 def test_beams_over_a_grid_are_those_of_the_twin(reach):
     # A slope of 0.2 to the east below a vehicle that rolls: some beams meet it within 6 m to 9 m and others do not.
@@ -351,6 +355,7 @@ def test_a_fix_below_the_surface_does_not_count():
         assert least < error.std() < most
 
 
+@pytest.mark.ci
 def test_readings_of_members_that_vary():
     truth, listed = voyage(60), parts(("depth",), position_sigma=1.0)
     varied = {"cell.noise": np.array([0.02, 0.0, 0.5]), "error_state_filter.start_error": np.array([0.0, 1.0, 5.0])}
@@ -455,6 +460,7 @@ def voyages():
     return sailed(200, 20.0, 0.5)
 
 
+@pytest.mark.ci
 def test_filters_of_an_ensemble_are_consistent(voyages):
     judged = lw.metrics.consistency(voyages, level=0.999)
     assert judged.nees_share == 1.0
@@ -580,6 +586,7 @@ def test_check_controller_covers_the_parts():
         assert lw.laws.check_controller(part).ok
 
 
+@pytest.mark.ci
 def test_the_page_has_all_keys_and_its_blocks_run(capsys, monkeypatch):
     monkeypatch.chdir(ROOT)
     page = "docs/controllers/navigation.md"

@@ -11,6 +11,8 @@ from tests.extensions.ocean import data
 from tests.support.pages import snippets
 from tests.support.tools import GRAVITY
 
+pytestmark = pytest.mark.ci
+
 pyproj = pytest.importorskip("pyproj")
 netcdf = pytest.importorskip("netCDF4")
 ORIGIN = (41.5, -70.5)

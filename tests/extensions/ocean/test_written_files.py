@@ -73,6 +73,7 @@ def read(path, origin, **more):
     return lw.terms.CurrentField.from_dataset(path, origin, **more)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("kind", KINDS)
 def test_values_are_those_of_the_closed_form(kind, tmp_path):
     make, origin, more, most = KINDS[kind]

@@ -119,6 +119,7 @@ def series(std=0.2):
     return truth, y, lw.studies.Series("position[0]", TIMES, y, std)
 
 
+@pytest.mark.ci
 def test_a_drifting_body_is_a_linear_regression():
     # In any order of the updates: of the members' own moments the filter makes what Bayes' rule does.
     fleet, (_, y, fixes) = drifting(), series()
@@ -158,6 +159,7 @@ def test_another_library_finds_the_same():
     assert answer.final.position[:, 0].mean() == pytest.approx(other.x[0, 0], abs=1e-8)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("name", ["enkf", "particles"])
 def test_other_filters_come_near_it(name):
     fleet, (_, y, fixes) = drifting(4000), series()
@@ -170,6 +172,7 @@ def test_other_filters_come_near_it(name):
     assert answer.std["current.velocity[0]"][-1] == pytest.approx(spread, rel=0.15)
 
 
+@pytest.mark.ci
 def test_two_instruments_and_missing_values():
     # Two series at one time are one measurement; a missing value says nothing; innovations have their spread.
     fleet, (_, _, fixes) = drifting(), series()
@@ -183,6 +186,7 @@ def test_two_instruments_and_missing_values():
     assert "Assimilation of 3 times to 4 s" in repr(answer)
 
 
+@pytest.mark.ci
 def test_members_that_an_event_stops_are_told():
     fleet, (_, _, fixes) = drifting(60), series()
     assert not lw.assimilate(fleet, fixes, method="rk8", h=0.05).messages
@@ -219,6 +223,7 @@ def test_angles_are_compared_within_half_a_turn(of):
     assert np.all(np.abs(apart) < 0.3)
 
 
+@pytest.mark.ci
 def test_what_is_refused():
     fleet, (_, _, fixes) = drifting(10), series()
     for message, call in {
@@ -268,6 +273,7 @@ def test_vehicles_are_as_sure_as_they_should_be(filter):
     assert low < np.mean(nees) / ((n - 1.0) / (n - 4.0)) ** 2 < high
 
 
+@pytest.mark.ci
 def test_two_instruments_of_one_quantity():
     fleet, (_, y, fixes) = drifting(), series()
     other = lw.studies.Series("position[0]", TIMES[:1], y[:1] + 0.1, 0.3)

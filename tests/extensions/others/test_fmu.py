@@ -88,6 +88,7 @@ def columns(rows, names):
     return np.stack([rows[name] for name in names], axis=1)
 
 
+@pytest.mark.ci
 def test_the_unit_moves_as_a_run(unit):
     """The same kernel and launches: round-off of what the host computes of them alone."""
     rows = simulated(unit)
@@ -100,6 +101,7 @@ def test_the_unit_moves_as_a_run(unit):
     assert not rows["status"].any()
 
 
+@pytest.mark.ci
 def test_parameters_and_the_seed_are_those_of_the_scene(unit):
     changes = {"vehicle.mass": 12.0, "drag.linear[0]": 2.0, "start.position[2]": 3.0, "depth_cell.bias": 0.5}
     rows = simulated(unit, start_values=changes | {"seed": 7})
@@ -127,6 +129,7 @@ def begun(instance):
     instance.exitInitializationMode()
 
 
+@pytest.mark.ci
 def test_long_communication_steps_reset_and_states(unit):
     """Steps of several periods make the same motion; a state comes back, serialized too, and so does the start."""
     instance, places = opened(unit)
@@ -268,6 +271,7 @@ def test_the_command_takes_a_scene_file(tmp_path):
     assert cli.main(["export", "example:remus_100_autopilot", "--to", str(target)]) == 2
 
 
+@pytest.mark.ci
 def test_inputs_that_are_no_numbers_end_no_vehicle(unit):
     """The step is refused with the reason; with a number the vehicle goes on as if it had not been asked."""
     instance, places = opened(unit)
@@ -287,6 +291,7 @@ def test_inputs_that_are_no_numbers_end_no_vehicle(unit):
     assert instance.getReal(wanted) == other.getReal(wanted)
 
 
+@pytest.mark.ci
 def test_a_parameter_of_a_vehicle_that_has_moved_lets_the_next_step_fail(unit):
     instance, places = opened(unit)
     begun(instance)

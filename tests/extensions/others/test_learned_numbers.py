@@ -58,6 +58,7 @@ def follow(fleet, y, std=0.05, **more):
     return lw.assimilate(fleet, fixes, [NAME], **{"method": "psi_x", "h": 0.5, **more})
 
 
+@pytest.mark.ci
 def test_kalmans_update_moves_the_logarithm_of_a_log_normal_number():
     # The same members by closed form, with Kalman's gain of their own covariance of place, speed and log(drag).
     fleet, y = slowing(), measured(0)
@@ -79,6 +80,7 @@ def test_kalmans_update_moves_the_logarithm_of_a_log_normal_number():
     assert (learned > 0.0).all()
 
 
+@pytest.mark.ci
 def test_particles_find_the_posterior():
     y = measured(1)
     mean, std, evidence = posterior(y)
@@ -223,6 +225,7 @@ def test_the_filter_is_named_where_it_leaves_what_the_scene_takes():
         follow(fleet, measured(0, truth=1.0), std=0.01, gate=None)
 
 
+@pytest.mark.ci
 def test_the_log_likelihood_is_that_of_kalmans_filter():
     # Of a linear scene the series is normal: H m, H P H^T + R, with the members' own moments at the start.
     fleet, (_, y, fixes) = drifting(), series()
@@ -247,6 +250,7 @@ def rng_case():
     return rng.normal(size=3), A @ A.T
 
 
+@pytest.mark.ci
 def test_particles_have_the_log_likelihood_too():
     fleet, (_, y, fixes) = drifting(4000), series()
     answer = lw.assimilate(fleet, fixes, ["current.velocity[0]"], filter="particles", method="rk8", h=0.05)
@@ -256,6 +260,7 @@ def test_particles_have_the_log_likelihood_too():
     assert answer.log_likelihood == pytest.approx(exact, abs=0.25)
 
 
+@pytest.mark.ci
 def test_a_value_far_away_is_left_out_and_told():
     fleet, (_, y, _) = drifting(), series()
     wild = lw.studies.Series("position[0]", TIMES, [y[0], 1e6, y[2]], 0.2)
@@ -273,6 +278,7 @@ def test_a_value_far_away_is_left_out_and_told():
     assert not taken.left_out["position[0]"].any()
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("filter", ["etkf", "particles"])
 def test_the_gate_is_a_chi_square_test(filter):
     # Three numbers at once: the square of the innovation over its covariance, beside chi-square of the same probability.
@@ -289,6 +295,7 @@ def test_the_gate_is_a_chi_square_test(filter):
         assert answer.left_out["position"].tolist() == [out]
 
 
+@pytest.mark.ci
 def test_inflation_is_a_factor_on_the_covariance():
     # Kalman's filter with P times 1.5 before each update, of place, speed and current.
     fleet, (_, y, fixes) = drifting(), series()
@@ -336,6 +343,7 @@ def accelerated(seed, acceleration, **more):
     return answer, error / answer.std["position"][-1, 0]
 
 
+@pytest.mark.ci
 def test_an_acceleration_that_the_scene_lacks_is_seen():
     answer, error = accelerated(3, 0.05)
     assert abs(error) > 3.0

@@ -82,6 +82,7 @@ def test_problems_are_solved_as_by_an_exact_program(more):
     assert 0 < beyond < 12
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("more", [{}, RATES | {"horizon": 4}], ids=["", "rates"])
 @pytest.mark.kernel
 def test_check_controller_finds_nothing(more):
@@ -156,6 +157,7 @@ def heave_law(**more):
 SAVE = lw.SaveAt(every=T, fields=("position", "velocity", "demand", "unconverged"))
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_a_loop_that_looks_ahead_is_that_of_exact_programs():
     # The model is exact, so that the estimate of a disturbance has nothing to add, whatever the reference does.
@@ -175,6 +177,7 @@ def test_a_loop_that_looks_ahead_is_that_of_exact_programs():
     assert forces.max() == pytest.approx(40.0, abs=1e-6) or forces.min() == pytest.approx(-25.0, abs=1e-6)
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_limits_of_errors_are_of_the_reference_that_it_sees_ahead():
     """At most 0.2 m deeper than is wanted then, at a cost: it rises before the reference does."""
@@ -185,6 +188,7 @@ def test_limits_of_errors_are_of_the_reference_that_it_sees_ahead():
     np.testing.assert_allclose(result.position[:, 0, 2], depths, atol=1e-6)
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_a_short_horizon_looks_ahead_too():
     """Loops of a few rounds are unrolled. A reference that does not change gives nothing to see."""
@@ -195,6 +199,7 @@ def test_a_short_horizon_looks_ahead_too():
     np.testing.assert_allclose(ahead, plain, atol=1e-9)
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_a_loop_in_single_precision_is_that_of_exact_programs():
     result = lw.solve(diving(heave_law(preview=True)), "rk4", h=T / 5.0, t1=TICKS * T, save=SAVE, dtype="float32")
@@ -205,6 +210,7 @@ def test_a_loop_in_single_precision_is_that_of_exact_programs():
     assert result.samples["unconverged"][-1, 0] == 0.0
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("lower", [None, [-25.0]], ids=["", "lower"])
 @pytest.mark.kernel
 def test_a_jump_of_the_reference_is_no_disturbance(lower):

@@ -34,6 +34,7 @@ def twin(**more):
     return part
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     "more", [{}, RATES, RATES | {"horizon": 1, "disturbance_time": np.inf}], ids=["", "rates", "one"]
 )
@@ -43,6 +44,7 @@ def test_check_controller_finds_nothing(more):
     assert report.ok, str(report)
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_every_state_and_input_is_that_of_the_twin():
     rng = np.random.default_rng(4)
@@ -145,6 +147,7 @@ RUSH = dict(A=np.array([[1.0, 20.0 * GAIN], [0.0, DECAY]]), B=np.array([[(T - 20
             Q=np.array([40.0, 0.0]), R=np.array([1e-4]))  # fmt: skip
 
 
+@pytest.mark.ci
 def test_a_loop_with_rate_limits_is_that_of_exact_problems():
     """Depths and demands of problems that Lawson & Hanson's method solves at each tick: an overshoot of 0.428 m."""
     part = linear_mpc.LinearMPC(
@@ -166,6 +169,7 @@ def test_a_loop_with_rate_limits_is_that_of_exact_problems():
     assert (rushing(50, "float32").position[:, 0, 2] - 12.0).max() == pytest.approx(max(depths), rel=0.01)
 
 
+@pytest.mark.ci
 def test_too_few_iterations_are_told():
     result = rushing(3)
     count = result.samples["unconverged"][:, 0]
@@ -258,6 +262,7 @@ def test_a_saturated_loop_is_that_of_the_twin(heave, loop):
         assert np.abs(result.attitude[: len(b), i] - R).max() < 1e-9
 
 
+@pytest.mark.ci
 def test_a_loop_keeps_its_limits_and_leaves_no_error(loop):
     varied, result = loop
     Z = result.samples["demand"][..., 2]
@@ -380,6 +385,7 @@ def test_limits_that_exclude_each_other_leave_the_box(heave):
     assert np.all(np.abs(found) <= 1.0)
 
 
+@pytest.mark.ci
 def test_singular_weights_have_an_answer():
     """Weights on inputs alone give no input; weights on the depth alone leave a problem of R."""
     none = twin(Q=np.zeros(3), limit=np.array([1e3, 1e3]))
@@ -392,6 +398,7 @@ def test_singular_weights_have_an_answer():
     assert report.ok, str(report)
 
 
+@pytest.mark.ci
 def test_a_run_goes_on_in_the_middle_of_its_problems(heave):
     fleet = lw.Ensemble.from_states(heaving(heave), *start(3))
     saved = {"fields": ("position", "attitude", "velocity", "angular_velocity")}

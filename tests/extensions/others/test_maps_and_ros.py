@@ -38,6 +38,7 @@ def path_of(run, member):
     return np.array(places), np.array(times)
 
 
+@pytest.mark.ci
 def test_a_map_has_the_members_until_they_ended(result, tmp_path):
     content = json.loads(lw.export(result, tmp_path / "run.geojson").read_text())
     assert content["type"] == "FeatureCollection"
@@ -57,6 +58,7 @@ def test_a_map_has_the_members_until_they_ended(result, tmp_path):
     assert features[3]["geometry"]["type"] == "Point"
 
 
+@pytest.mark.ci
 def test_a_file_for_globes_has_them_with_their_times(result, tmp_path):
     root = ElementTree.parse(lw.export(result, tmp_path / "run.kml", members=[1, 2, 3])).getroot()
     space = {"k": "http://www.opengis.net/kml/2.2", "gx": "http://www.google.com/kml/ext/2.2"}
@@ -196,6 +198,7 @@ def test_lines_are_cut_wherever_they_cross():
     np.testing.assert_array_equal(whole, there[1:3])
 
 
+@pytest.mark.ci
 def test_maps_of_more_than_1000_members_are_of_members_that_are_named(tmp_path):
     many = lw.Ensemble(scene(origin=ORIGIN), members=1001, vary={"vehicle.buoyancy": lw.distributions.Normal(std=1.0)})
     run = lw.solve(many, **SETTINGS | {"t1": 0.2, "save": lw.SaveAt(every=0.1)})

@@ -121,6 +121,7 @@ def test_who_knows_it():
     assert all(thing.surface_level is None for thing in (*plain.terms, *plain.events))
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_a_floating_body_in_a_slow_tide():
     # A box that floats: M z'' + c z' + B / H (z + eta - d) = 0, d where it floats in still water. Its steady motion follows.

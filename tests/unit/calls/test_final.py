@@ -95,6 +95,7 @@ def test_parameters_of_another_shape_are_others(fleet, result):
         lw.prepare(fleet.scene, method="psi_s", of="depth", **ARGUMENTS).states(end)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(("name", "change"), [("position", [100.0, 0.0, 0.0]), ("velocity", [0.0, 0.1, 0.0]),
                                               ("angular_velocity", [0.0, 0.0, 0.1])])  # fmt: skip
 @pytest.mark.parametrize("dtype", ["float64", "float32"])
@@ -110,6 +111,7 @@ def test_states_that_are_not_those_of_the_lanes_are_refused(name, change, dtype,
     assert not np.array_equal(lw.solve(fleet, "psi_s", **settings, start=again(moved)).position[-1], whole)
 
 
+@pytest.mark.ci
 def test_an_attitude_that_is_not_that_of_the_lanes_is_refused(fleet):
     final = lw.solve(fleet, "rk4", **ARGUMENTS | {"t1": 0.2}).final
     assert lw.solve(fleet, "rk4", **ARGUMENTS, start=again(final)).status.failed.sum() == 0
@@ -119,6 +121,7 @@ def test_an_attitude_that_is_not_that_of_the_lanes_is_refused(fleet):
         again(final, {"final.lanes.state": final.lanes["state"] + 1e-3})
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("name", ["remus_100", "bluerov2_heavy", "rexrov"])
 def test_states_of_vehicles_in_other_axes_and_moving_water_are_those_of_their_lanes(name):
     water = [
@@ -167,6 +170,7 @@ def test_a_tampered_file_is_refused(tampered, result, tmp_path):
         lw.Result.load(path)
 
 
+@pytest.mark.ci
 def test_members_that_failed_and_drifted_attitudes_are_taken(fleet, result, tmp_path):
     final = result.final
     states = dict(final.states)

@@ -131,6 +131,7 @@ def test_every_taker_refuses_the_same(name, takers):
             takers[name](odd)
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_a_run_in_a_store_reads_backward_slices_and_masks_as_memory_does(takers, tmp_path):
     fleet = lw.Ensemble(lw.Scene(lw.Vehicle(**BODY)), N, 1, {"start.position": lw.distributions.Normal(std=1.0)})

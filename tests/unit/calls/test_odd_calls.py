@@ -62,6 +62,7 @@ def raw_of(calls):
     return found
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_no_odd_call_ends_in_a_raw_error(inputs):
     calls = [call for call in odd_calls.odd_calls(*inputs) if call[0].split("(")[0] not in LONG]

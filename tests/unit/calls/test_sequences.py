@@ -110,6 +110,7 @@ def runs():
     }  # fmt: skip
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 @pytest.mark.parametrize(("path", "name"), [(path, name) for path, names in RUN.items() for name in sorted(names)])
 def test_runs_take_every_way_of_giving_a_sequence(path, name, runs):

@@ -82,12 +82,14 @@ def test_the_recording_holds_every_pose(finished):
     assert rows == 5
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_quiet_says_nothing(tmp_path, capfd):
     assert cli.main(["run", PAPER, "--out", str(tmp_path), *SMALL, "--quiet"]) == 0
     assert capfd.readouterr() == ("", "")
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_options_reach_the_run(tmp_path, capsys):
     # A kernel that other tests load as well.
@@ -213,6 +215,7 @@ def test_exit_codes_are_told(capsys):
     assert "exit codes:\n  0    done\n  1    members, files or the disk failed" in capsys.readouterr().out
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_info(capsys):
     assert cli.main(["info"]) == 0
@@ -220,6 +223,7 @@ def test_info(capsys):
     assert all(word in out for word in ("cpu", "threads", "warp-lang 1.19", "chained float32 ", "GFMA/s"))
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_bench(capsys):
     assert cli.main(["bench", "--members", "64", "--steps", "10"]) == 0
@@ -228,6 +232,7 @@ def test_bench(capsys):
     assert all(r["ns_per_vehicle_step"] > 0 and r["part_of_peak"] > 0 for r in records)
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_warnings_are_counted_and_explained(tmp_path, capsys):
     # At h = 0.5 and 3 m/s both oscillations of the paper's vehicle are coarse; nothing fails.
@@ -252,6 +257,7 @@ def test_raise_exits_with_1_and_writes_the_files(tmp_path, capsys):
     assert lw.Result.load(tmp_path / "result.npz").status.counts() == {"step_too_large": 20}
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_substep_is_told_of(tmp_path, capsys):
     options = ["--on-failure", "substep", "--set", "start.angular_velocity=[0,0,250]"]
@@ -259,6 +265,7 @@ def test_substep_is_told_of(tmp_path, capsys):
     assert "substeps    4,000 steps of 20 members" in capsys.readouterr().out
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_a_step_is_chosen_by_options(tmp_path, capsys):
     options = ["--method", "rk8", "--rtol", "1e-9", "--atol", "1e-9", "--step", "0.5"]

@@ -161,6 +161,7 @@ def test_every_method_that_is_listed_is_one(capsys):
         assert text.startswith(f"order {lw.Method(name).order}, ")
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 @pytest.mark.slow_but("remus_100", "eca_a9")
 @pytest.mark.parametrize("name", lw.vehicles.names())
@@ -341,6 +342,7 @@ def test_the_document_of_a_prediction(capsys):
     assert capsys.readouterr() == ("", "")
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_documents_of_a_run_and_its_folder(tmp_path, capsys):
     out = str(tmp_path / "paper")
@@ -370,6 +372,7 @@ def test_documents_of_a_run_and_its_folder(tmp_path, capsys):
     assert "how         seed 1, " in said
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_documents_of_stores(tmp_path, capsys):
     run = ["run", PAPER, "--members", "300", *SMALL[2:], "--store", "zarr"]

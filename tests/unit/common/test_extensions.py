@@ -60,6 +60,7 @@ def foreign(tmp_path):
     return tmp_path
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("code", [
     "import lgvi_warp",
     "import lgvi_warp as lw; lw.Scene.named('remus_100'); lw.terms.Drag; lw.control.Sensor",

@@ -139,6 +139,7 @@ def drawn(width, name, member, step, channel, seed0, seed1):
     return out.numpy().reshape(7, -1).T
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 @pytest.mark.parametrize(("width", "name"), [(1, "float64"), (8, "float64"), (1, "float32"), (16, "float32")])
 @pytest.mark.parametrize(
@@ -152,6 +153,7 @@ def test_kernel_and_twin(width, name, step, channel, seed0, seed1):
     np.testing.assert_array_equal(got[:, 4:], got[:, :3])
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 @pytest.mark.parametrize(("name", "widths"), [
     ("float64", (1, 8)), ("float32", (1, 16)),
@@ -164,6 +166,7 @@ def test_every_width_gives_the_same_bits(name, widths):
         np.testing.assert_array_equal(other, first)
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_small_radii_in_float32():
     """Uniform numbers next to 1 give radii next to 0: they are drawn from the word, so float32 does not lose them."""

@@ -40,6 +40,7 @@ def test_members_beyond_those_that_ran_are_not_run_again():
     assert Observation(keep="none").again(status).tolist() == []
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_statistics_are_the_same_whether_blocks_run_as_one_or_apart(tmp_path):
     """Also of members that ended, and of a function that sees members; a store runs each block apart."""

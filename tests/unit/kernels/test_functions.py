@@ -121,6 +121,7 @@ def errors(function, name, width):
     return np.abs(evaluate(width, name, x)[function] - exact) / scale / np.finfo(dtype).eps
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("function", ERRORS)
 @pytest.mark.parametrize(("width", "name"), THOROUGH)
 def test_function(function, width, name):
@@ -128,6 +129,7 @@ def test_function(function, width, name):
     assert errors(function, name, width).max() < ERRORS[function]
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(("width", "name"), THOROUGH)
 def test_arctangent2(width, name):
     rng, n, dtype = np.random.default_rng(4), 40_000, FORMATS[name][1]
@@ -144,6 +146,7 @@ def test_arctangent2(width, name):
     assert error.max() < ARCTANGENT_ERROR
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(("width", "name"), THOROUGH)
 def test_special_values_of_the_arctangent(width, name):
     nan = np.nan
@@ -154,12 +157,14 @@ def test_special_values_of_the_arctangent(width, name):
     np.testing.assert_allclose(evaluate(width, name, y, x)["arctangent2"], expected, rtol=4e-7)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(("width", "name"), THOROUGH)
 def test_minus_of_a_vector(width, name):
     a, b, c = np.random.default_rng(5).integers(-9, 10, (3, 1000)).astype(float)
     np.testing.assert_array_equal(evaluate(width, name, a, b, c)["neg"], -(a + 2 * b + 4 * c))
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(("width", "name"), THOROUGH)
 def test_fused_rounds_once(width, name):
     # (1 + 2^-k)(1 - 2^-k) - 1 = -2^-2k, where the product alone is rounded to 1.
@@ -168,6 +173,7 @@ def test_fused_rounds_once(width, name):
     assert evaluate(width, name, [1.0 + part], 1.0 - part, -1.0)["fused"] == [-(part**2)]
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(("width", "name"), THOROUGH)
 def test_about_one_over_a_root(width, name):
     # A guess to 0.035 leaves e = 0.07 of the square; the series stops at its fourth power, of which 35/128 are missing.
@@ -179,6 +185,7 @@ def test_about_one_over_a_root(width, name):
     assert np.isnan(none)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(("width", "name"), THOROUGH)
 def test_special_values(width, name):
     nan, inf = np.nan, np.inf
@@ -199,6 +206,7 @@ def test_special_values(width, name):
         np.testing.assert_allclose(got[function][kept], [values[i] for i in kept], rtol=4e-7, err_msg=function)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(("width", "name"), THOROUGH)
 def test_the_exponential_ends_where_the_format_does(width, name):
     dtype = FORMATS[name][1]
@@ -215,6 +223,7 @@ def test_the_exponential_ends_where_the_format_does(width, name):
     np.testing.assert_allclose(got[[0, 2, 4]], exact[[0, 2, 4]], rtol=2 * info.eps, atol=info.smallest_subnormal)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(("width", "name"), THOROUGH)
 def test_clamp_and_greatest(width, name):
     rng = np.random.default_rng(2)
@@ -226,6 +235,7 @@ def test_clamp_and_greatest(width, name):
     assert np.isnan(evaluate(width, name, [np.nan], [-1.0], [1.0])["clamp"]).all()
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(("name", "widths"), [
     ("float64", (1, 8)),
     ("float32", (1, 16)),
@@ -243,6 +253,7 @@ def test_every_type_was_tested():
     assert {FORMATS[name][0] for name in FORMATS} == set(REALS)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(("width", "name"), THOROUGH)
 def test_a_small_turn(width, name):
     rng, dtype = np.random.default_rng(5), FORMATS[name][1]

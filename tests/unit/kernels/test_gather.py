@@ -52,6 +52,7 @@ def read(width, real, x, entry, row, lanes, numbers):
     return index.numpy().reshape(x.shape), out.numpy().reshape(6, *x.shape)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("real", REALS, ids=("float32", "float64"))
 @pytest.mark.parametrize("width", WIDTHS)
 def test_three_rows_from_each_lanes_own_index_on(width, real):
@@ -73,6 +74,7 @@ def test_three_rows_from_each_lanes_own_index_on(width, real):
         np.testing.assert_array_equal(out[3 + i], numbers[1, row + at + i])
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("real", REALS, ids=("float32", "float64"))
 @pytest.mark.parametrize("width", WIDTHS)
 def test_a_whole_number_is_at_or_below_and_one_that_int32_holds(width, real):

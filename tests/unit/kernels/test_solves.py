@@ -97,6 +97,7 @@ def left_side(F, weight):
     return vee(F @ D - D @ np.swapaxes(F, 1, 2)), D
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(("solver", "rotation_of"), [("cayley", cay), ("newton", turn)])
 def test_the_solution_solves_equation_24(iterates, solver, rotation_of):
     a, _, values = iterates

@@ -443,6 +443,7 @@ GROWTHS = {
 }  # fmt: skip
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("name", GROWTHS)
 def test_growth_is_that_of_two_runs_whose_attitudes_differ(scene, name):
     grows, power, rate, double, single = GROWTHS[name]

@@ -46,6 +46,7 @@ def assert_is_of(frame, result):
     np.testing.assert_array_equal(frame["end_time"], [min(1.0, 1.0 if np.isnan(t) else t) for t in result.failure_time])
 
 
+@pytest.mark.ci
 def test_a_row_for_each_member(result):
     frame = result.frame()
     assert {"ok", "floor"} == set(frame["outcome"])
@@ -57,6 +58,7 @@ def test_a_row_for_each_member(result):
     assert frame.index.tolist() == list(range(8))
 
 
+@pytest.mark.ci
 def test_of_a_store_a_file_a_part_and_single_precision(result, tmp_path):
     solved(store=tmp_path / "run.zarr")
     stored, whole = lw.open_run(tmp_path / "run.zarr"), result.frame()

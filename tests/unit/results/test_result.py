@@ -23,6 +23,7 @@ def result():
     return lw.solve(one(scene, b, R, nu, Om), h=0.05, t1=1.0, save=lw.SaveAt(every=0.25)), body_of(scene)
 
 
+@pytest.mark.ci
 def test_shapes(result):
     r, _ = result
     k, n = 5, 5

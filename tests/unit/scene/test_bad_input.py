@@ -437,6 +437,7 @@ def test_a_law_without_a_struct_whose_numbers_make_none():
     assert all(word in fault for word in ("pull.device", "has no params(width, real)", "add_a_force.md")), fault
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_a_law_that_returns_nothing():
     term = type("Bad", (Packs,), {"device": device(law=pull_silent), "__annotations__": {}})(k=1.0)
@@ -492,6 +493,7 @@ def test_a_quadratic_matrix_of_members_that_creates_energy():
     lw.Ensemble(scene, 2000, 0, {"drag_matrix.quadratic": lw.distributions.Uniform(relative=0.3)})
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_a_broken_law_in_solve():
     broken = device(law=pull_silent)
@@ -521,6 +523,7 @@ def law(w: Any, view: Any, p: Any):
 """
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_a_law_defined_twice_as_in_a_notebook(tmp_path):
     results = []

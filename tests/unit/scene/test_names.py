@@ -68,6 +68,7 @@ def on_the_command(path, *options):
     )
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(("file", "name"), EVERY)
 def test_every_entry_takes_every_number(file, name):
     """File, --set, load, with_numbers and a sweep's set: the same scene, of which that of the written file is the witness."""
@@ -118,6 +119,7 @@ def test_parts_by_their_places():
     assert set(lw.Ensemble(scene, 2, vary=vary).vary) == {"depth_cell.bias"}
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 @pytest.mark.parametrize(
     ("file", "name", "value"),

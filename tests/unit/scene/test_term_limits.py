@@ -190,6 +190,7 @@ def test_a_uniform_current_shifts_waves_and_nothing_is_said_until_it_blocks_them
     says(text, "waves.periods", "of 50 members")
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 @pytest.mark.parametrize("U", [1.0, -1.0])
 def test_the_percentage_is_that_of_a_run(U):

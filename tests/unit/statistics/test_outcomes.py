@@ -215,6 +215,7 @@ def test_replicates_give_the_value_of_all_and_an_interval_of_their_spread():
     assert (ratio < 2.5).all()
 
 
+@pytest.mark.ci
 @pytest.mark.slow_for("rates2", "rates3")
 @pytest.mark.parametrize("rates", [(0.1, 0.05, 0.02), (0.01, 0.3, 0.0), (0.1, 0.1, 0.2), (0.03, 0.2, 0.1)])
 def test_coverage(rates):

@@ -41,6 +41,7 @@ def answers(name, p, seeds, **more):
     return [searched(limit, d, seed=seed, **more) for seed in seeds]
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("name", CASES)
 def test_the_answer_is_within_three_spreads(name):
     (found,) = answers(name, 1e-5, [1])

@@ -98,6 +98,7 @@ def test_what_weights_do_not_see_is_by_the_rule_of_succession(count, odd):
     assert unseen(0.0, 0.0) == 0.0
 
 
+@pytest.mark.ci
 def test_a_mode_that_is_not_drawn_is_within_the_error():
     """One vehicle in fifty fails otherwise; chains and the second look pass by, and the draws' own error does not tell."""
     limit, p = two_modes(1.0, 0.02)

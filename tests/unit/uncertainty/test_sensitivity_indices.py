@@ -194,6 +194,7 @@ EXACT = {linear: (PARTS, PARTS),
          ishigami: tuple(np.array(parts) / (V1 + V2 + V13) for parts in ((V1, V2, 0.0), (V1 + V13, V2, V13)))}  # fmt: skip
 
 
+@pytest.mark.ci
 @pytest.mark.slow_but("*-64-8")
 @pytest.mark.parametrize(("samples", "replicates"), [(64, 8), (512, 8), (256, 16)])
 @pytest.mark.parametrize("function", EXACT)

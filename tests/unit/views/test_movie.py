@@ -32,6 +32,7 @@ def frames_of(path):
     return np.array(found), times
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("ending", movie.ENDINGS)
 def test_a_plain_one_has_its_frames_and_things_move(ending, tmp_path):
     path = lw.plots.movie(fleet_result(), tmp_path / f"fleet{ending}", frames=4, seconds=2.0, by="plot")

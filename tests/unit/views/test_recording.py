@@ -438,6 +438,7 @@ def test_no_viewer_is_loaded_before_it_is_needed():
     assert said.stdout == "False\n"
 
 
+@pytest.mark.ci
 def test_2000_members_take_a_second(tmp_path):
     large = fleet(2000, 200)
     lw.record(fleet(3, 5), tmp_path / "warm.rrd")

@@ -161,6 +161,7 @@ def test_what_a_file_says_is_text(tmp_path):
     assert "lgvi-warp run '<b>;rm -rf.toml'" in unescape(text)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("source", [{}, {"text": 3}, {"text": None, "file": "a"}])
 def test_without_a_text_of_a_file_its_tables_are_told(tmp_path, source):
     result = of_file(tmp_path)

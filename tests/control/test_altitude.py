@@ -101,6 +101,7 @@ def test_beams_with_errors_are_those_of_the_twin():
             assert r.samples["reference_depth"][k, i] == pytest.approx(wanted, abs=1e-9)
 
 
+@pytest.mark.ci
 def test_without_an_echo_it_reads_its_reach_and_below_the_floor_nothing():
     level = np.array([39.0, 30.0, 5.0])
     b = np.column_stack([np.zeros((3, 2)), level])
@@ -155,6 +156,7 @@ def test_check_controller_finds_nothing(part):
     assert report.ok, report
 
 
+@pytest.mark.ci
 def test_limits_and_each_member_has_its_own():
     scene = scene_of(rough(0.0), lw.control.Altimeter(most=50.0))
     fleet = one(scene, b=(0.0, 0.0, 10.0), parameters={

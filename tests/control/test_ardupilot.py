@@ -50,6 +50,7 @@ def rotation(quaternion):
     ])  # fmt: skip
 
 
+@pytest.mark.ci
 def test_the_kept_exchange_over_loopback(vehicle):
     """The bytes that are kept are sent by UDP; the answers are those that are kept, but for round-off of other processors."""
     kept = [json.loads(line) for line in KEPT.read_text().splitlines()]
@@ -172,6 +173,7 @@ def test_strange_packets_have_no_answer(vehicle, sent):
     assert vehicle.strange == 1
 
 
+@pytest.mark.ci
 def test_it_is_the_run_of_the_same_commands(vehicle):
     """`lw.solve` with the same commands from Python: the same bits."""
     sent = pulses(4, 120)

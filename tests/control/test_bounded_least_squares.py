@@ -323,6 +323,7 @@ def test_priorities_of_any_size_are_met_exactly(frame, dead, n, dtype):
     assert lacks > n // 5
 
 
+@pytest.mark.ci
 def test_too_few_steps_are_told():
     demands = np.array([[300.0, 0.0, 0.0, 0.0, 0.0, 20.0], [1.0, 0.0, 0.0, 0.0, 0.0, 0.0]])
     _, _, result = made_of((8, 6), demands, np.ones(6), (), "float64", iterations=1)
@@ -348,6 +349,7 @@ def test_a_loop_comes_to_its_place_whatever_the_priorities(priority):
     np.testing.assert_array_equal(result.unmet[-1, 0], 0.0)
 
 
+@pytest.mark.ci
 def test_priorities_act_where_thrusters_do_not_span_the_demand():
     """Six thrusters: X pushes the nose about as well; X = 50 N alone, by the priority of M, within the limits."""
     place, way = np.array(THRUSTERS.position), np.array(THRUSTERS.direction)

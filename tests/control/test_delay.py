@@ -43,6 +43,7 @@ def wanted(delay, fault=(np.inf, 1.0, 0.0)):
     return np.array(headings)
 
 
+@pytest.mark.ci
 @pytest.mark.slow_for("rk4")
 @pytest.mark.parametrize("method", ["psi_s", "rk4"])
 def test_a_delay_is_whole_periods_and_steps(method):
@@ -61,12 +62,14 @@ def test_a_delay_is_whole_periods_and_steps(method):
     assert np.array_equal(ends.attitude[-1], result.attitude[-1])
 
 
+@pytest.mark.ci
 def test_a_delay_that_varies_is_that_of_the_nearest_step():
     nearest = lw.solve(members([2.25, 2.75, 6.9, 0.2]), "psi_s", h=H, t1=1.0)
     whole = lw.solve(members([2, 3, 7, 0]), "psi_s", h=H, t1=1.0)
     assert np.array_equal(nearest.attitude, whole.attitude)
 
 
+@pytest.mark.ci
 def test_a_fault_begins_at_the_first_tick_at_or_after_its_time():
     # Ticks at 0.5 and 0.6 s; a time on a tick, one after it, never.
     times = np.array([0.5, 0.51, 0.6, np.inf, 0.0])

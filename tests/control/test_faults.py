@@ -356,6 +356,7 @@ def test_faults_of_late_commands():
                     assert abs(got - wanted) < 1e-12, (m, k, s, f)
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_a_run_that_goes_on_in_the_middle_of_faults_has_the_same_bits(driven):
     lag, whole = driven

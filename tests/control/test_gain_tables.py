@@ -94,6 +94,7 @@ def by_hand(start, seconds):
 STARTS = ((0.2, 0.1, 0.0, 0.05, 0.0, 1.5), (1.6, -0.2, 0.1, 0.0, 2.0, 3.0), (-0.3, 0.0, 0.2, -0.1, 0.4, 7.0))
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_the_loop_is_that_of_a_simulator_by_hand_to_the_order_of_the_step():
     s = np.array(STARTS)
@@ -114,6 +115,7 @@ def test_the_loop_is_that_of_a_simulator_by_hand_to_the_order_of_the_step():
     assert 10.0 < errors[0] / errors[1] < 24.0
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_the_loop_is_its_twins_in_any_attitude():
     rng = np.random.default_rng(4)

@@ -52,6 +52,7 @@ def test_axes_of_ros():
     assert np.allclose((ours.inv() * later).as_rotvec(), rates * [1, -1, -1], rtol=0.0, atol=1e-14)
 
 
+@pytest.mark.ci
 def test_a_positive_moment_turns_to_starboard_and_depth_grows_downward():
     """One run: pushed down and turned by N, the vehicle sinks and its heading grows from north to east."""
     vehicle = lw.Vehicle(10.0, inertia=(1.0, 2.0, 3.0))

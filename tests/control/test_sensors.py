@@ -324,6 +324,7 @@ def test_a_filters_step_response():
     assert np.abs(seen - (1.0 - np.exp(-np.arange(TICKS) * PERIOD / 0.7))).max() < TICKS * EPS["float64"]
 
 
+@pytest.mark.ci
 def test_dead_reckoning_with_a_bias_goes_astray_with_time():
     # Level, heading north: the error is that of the velocity times the time.
     truth = np.zeros((TICKS, 1, 21))

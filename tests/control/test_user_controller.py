@@ -153,6 +153,7 @@ def shapeless_control(w: Any, r: Any, y: Any, p: Any):
     return w + p.nothing
 
 
+@pytest.mark.ci
 def test_what_is_no_part_or_does_not_compile_is_refused():
     with pytest.raises(lw.SceneError, match=r"is not a part of a controller. Give an object"):
         lw.laws.check_controller(lw.control.HeadingPID)

@@ -19,6 +19,7 @@ def finite(result, members):
     return all(np.isfinite(getattr(result, name)[:, members]).all() for name in FIELDS)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("dtype", DTYPES)
 def test_one_sick_member_among_many(dtype):
     n = 100_000
@@ -32,6 +33,7 @@ def test_one_sick_member_among_many(dtype):
     assert np.isnan(result.velocity[-1, 70_001, 1])  # as it was given: nothing is reset
 
 
+@pytest.mark.ci
 @pytest.mark.slow_for("1--inf*")
 @pytest.mark.parametrize("dtype", DTYPES)
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
@@ -48,6 +50,7 @@ def test_every_member_fails_at_once(dtype, bad, field):
         np.testing.assert_allclose(end[np.isfinite(end)], start[np.isfinite(end)], rtol=1e-6, atol=1e-6)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("dtype", DTYPES)
 def test_subnormal_states_are_no_fault(dtype):
     tiny = 5e-324 if dtype == "float64" else 1e-45
@@ -63,6 +66,7 @@ def test_subnormal_states_are_no_fault(dtype):
     assert found.error[1] <= found.bound[1]
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("dtype", DTYPES)
 def test_huge_states(dtype):
     far = 1e300 if dtype == "float64" else 1e35
@@ -91,6 +95,7 @@ def test_parameters_that_are_not_finite_are_refused(name, bad):
         lw.Ensemble.from_states(GENERAL, *states, {name: values})
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("dtype", DTYPES)
 @pytest.mark.parametrize("name", ["vehicle.mass", "vehicle.inertia"])
 def test_parameters_beyond_the_precision_are_flagged(dtype, name):

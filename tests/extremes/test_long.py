@@ -169,6 +169,7 @@ def about(axis, angle):
     return np.eye(3, dtype=extended.REAL) + np.sin(angle) * H + (1 - np.cos(angle)) * H @ H
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("dtype", DTYPES)
 @pytest.mark.parametrize("steps", [100_000, pytest.param(100_000_000, marks=SLOW)])
 def test_many_steps_of_a_free_spheroid(steps, dtype):

@@ -115,6 +115,7 @@ def fleet_residual(fleet):
     return np.abs(p["vehicle.mass"] * p["environment.gravity"] - p["vehicle.buoyancy"])
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("examples", [6, pytest.param(60, marks=pytest.mark.slow)])
 def test_kernel_and_twin_agree_on_the_status(examples):
     # psi_s in extended precision tells whether every |J^-1 a| stayed below 1. Within a billionth of it either may be right,

@@ -12,6 +12,7 @@ from tests.conftest import ROOT
 from tests.support.pages import blocks
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("page", ["add_a_method.md", "add_a_statistic.md", "add_a_sampling.md"])
 def test_example(page, monkeypatch):
     monkeypatch.chdir(ROOT)

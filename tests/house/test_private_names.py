@@ -81,6 +81,7 @@ def read() -> dict[Path, tuple[set[str], list[ast.AST]]]:
     return files
 
 
+@pytest.mark.ci
 def test_no_private_name_is_used_across_files(read):
     everywhere = set().union(*(own for own, _ in read.values()))
     found = []

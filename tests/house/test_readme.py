@@ -59,6 +59,7 @@ def test_six_questions_are_answered_where_the_page_says():
     assert [words for _, words in rows if words not in first] == []
 
 
+@pytest.mark.ci
 def test_the_first_example(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     runpy.run_path(str(ROOT / "examples" / "01_first_dive.py"), run_name="__main__")

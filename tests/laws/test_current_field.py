@@ -188,6 +188,7 @@ def test_the_nodes_of_a_field_are_written_once_for_all_calls(monkeypatch):
     np.testing.assert_array_equal(answer, run(second))
 
 
+@pytest.mark.ci
 def test_no_list_is_made_of_the_numbers_of_a_field_before_the_provenance_is_read():
     rng = np.random.default_rng(6)
     field = lw.terms.CurrentField(velocities=0.1 * rng.normal(size=(60, 60, 20, 3)), spacing=[1.0, 1.0, 1.0])

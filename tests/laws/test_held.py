@@ -78,6 +78,7 @@ def test_held_commands_push_as_a_schedule_does_that_never_changes(method, dtype,
     assert difference(*ends) < ROUND_OFF[dtype]
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_members_may_hold_other_commands():
     # Among others and alone: to the last bit.

@@ -131,6 +131,7 @@ def test_a_growing_strain_turns_a_spheroid_as_its_pressure_does():
     np.testing.assert_allclose(got, [0.0, -0.01 * k, 0.0], atol=(np.pi / 256.0) ** 2 * 0.01 * k)
 
 
+@pytest.mark.ci
 def test_strips_meet_the_pressure_on_spheroids_as_these_grow_slender():
     rng = np.random.default_rng(3)
     S = rng.normal(size=(3, 3)) * 0.1

@@ -34,6 +34,7 @@ def test_jumps_at_whole_steps_cost_no_order(method, h):
     assert abs(result.position[-1, 0, 0] - exact(4.0)) < 1e-9
 
 
+@pytest.mark.ci
 def test_late_in_a_run_too():
     late = lw.Start(velocity=[0.0, 0.0, 0.0])
     shifted = [1000.0 + t for t in TIMES]

@@ -68,6 +68,7 @@ def test_a_fin_across_the_flow_stops_as_a_plate():
     np.testing.assert_allclose(found, [0.0, 0.0, 2.0 / (1.0 + rate * 2.0 * 2.0)], rtol=1e-4, atol=1e-15)
 
 
+@pytest.mark.ci
 def test_lift_does_no_work():
     # The law itself, to round-off; and a run of lift alone, with inertia that keeps its energy in every other map.
     law = Fins(**vars(CASES["fins"].laws[0]) | {"drag": np.zeros(3), "drag_normal": np.zeros(3)})

@@ -87,6 +87,7 @@ def test_water_that_is_taken_in():
     np.testing.assert_allclose(result.position[:, 0, 0], 30.0 * np.log1p(0.05 * result.time), rtol=1e-8)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("method", ["rk4", pytest.param("rk8", marks=pytest.mark.slow)])
 def test_a_gyrostat(method):
     # About its axis of symmetry with a wheel on that axis: J1 w' = (J1 - J3) w3 w2 - s w2 and so on, a turn at a steady rate.

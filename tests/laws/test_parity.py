@@ -151,6 +151,7 @@ def test_the_papers_forces(name, method):
     assert difference(kernel, twin) < 2e-13
 
 
+@pytest.mark.ci
 def test_forces_that_turn_the_momenta():
     # From -3/4 to 1/4 of the impulse of a step: in both halves the impulse is more than the momenta that are left.
     force, h = np.array((1000.0, -300.0, 200.0)), 0.01

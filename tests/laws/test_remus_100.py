@@ -146,6 +146,7 @@ def steady_turn(rudder):
     return found.x
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("rudder", RUDDERS)
 def test_steady_turn(rudder):
     # 100 s after cruising nothing is left of the transient, exp(-0.17 t). The step shifts the balance as it does the
@@ -168,6 +169,7 @@ def jacobian(f, x, *args):
     return np.array(columns).T
 
 
+@pytest.mark.ci
 def test_the_way_into_a_turn():
     # Against an integration to 1e-11 of the equations here, 3 s after the rudder is put over; (6 h)^2 / 12 as above.
     rudder, t1 = RUDDERS[1], 3.0
@@ -182,6 +184,7 @@ def test_the_way_into_a_turn():
     assert slope(steps, errors) == pytest.approx(2.0, abs=0.1)
 
 
+@pytest.mark.ci
 def test_the_straight_course_is_unstable():
     # The hull's Munk moment is larger than what its fins hold: a disturbance of yaw grows at the fastest root's rate.
     fastest = np.linalg.eigvals(jacobian(plane_acceleration, np.array([CRUISE, 0.0, 0.0]), 0.0)).real.max()

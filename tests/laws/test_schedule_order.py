@@ -171,6 +171,7 @@ def test_float32_follows_as_float64_does(method):
     np.testing.assert_allclose(a, b, rtol=0.0, atol=5e-4)
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_a_run_that_goes_on_in_the_midst_keeps_its_bits():
     first = lw.solve(fleet("ballast"), "psi_s", h=0.1, t1=3.0)

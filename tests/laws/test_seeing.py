@@ -66,6 +66,7 @@ def test_friction_stops_a_vehicle_over_the_ground(water, method, h, allowed):
     np.testing.assert_allclose(b, np.array([1.0, 0.5, 0.0]) * (1.0 - np.exp(-1.5)) * 20.0 / 30.0, atol=allowed)
 
 
+@pytest.mark.ci
 def test_friction_however_strong_is_stable():
     b, _, nu, _ = last(
         lw.solve(

@@ -50,6 +50,7 @@ def test_stages_read_what_the_twin_computes(method, name):
     assert difference(*both(scene_of(KINDS[name]), body_of(KINDS[name]), method, 0.02, 50)) < 2e-12
 
 
+@pytest.mark.ci
 @pytest.mark.slow_but("rk4-fast fins", "rk4-prompt thrusters")
 @pytest.mark.parametrize("name", KINDS)
 @pytest.mark.parametrize("method", METHODS)

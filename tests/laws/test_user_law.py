@@ -74,6 +74,7 @@ def test_the_energy_is_kept_to_second_order():
     assert abs(np.polyfit(np.log(STEPS), np.log(drifts), 1)[0] - 2.0) < 0.2
 
 
+@pytest.mark.ci
 def test_mud_only_takes_energy():
     both = [own_law.Dock(**DOCK), own_law.Mud(**MUD)]
     energy = solve(both, h=0.01, save=lw.SaveAt(every=0.5)).energy[:, 0]

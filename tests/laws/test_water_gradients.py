@@ -89,6 +89,7 @@ def by_pressure(cases):
     return np.array(found)
 
 
+@pytest.mark.ci
 def test_the_flow_of_these_tests_is_what_it_says():
     strain = np.array([[0.1, -0.05, 0.2], [-0.05, -0.04, 0.08], [0.2, 0.08, -0.06]])
     report = lw.laws.check_law(

@@ -156,6 +156,7 @@ def test_events_stop_where_they_do():
         assert getattr(result, name)[:, ~stopped].tobytes() == getattr(alone, name)[:, ~stopped].tobytes()
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("method", ["psi_s", pytest.param("psi_x", marks=SLOW)])
 def test_a_failure_beside_changes_nothing(method):
     # Chunks with a failing lane are repeated one step at a time: the low parts too start where the chunk did.
@@ -169,6 +170,7 @@ def test_a_failure_beside_changes_nothing(method):
         assert getattr(one_of_them, name)[:, well].tobytes() == getattr(all_well, name)[:, well].tobytes()
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("method", ["psi_s", *(pytest.param(name, marks=SLOW) for name in ("psi_x", "psi_1"))])
 def test_launches_and_samples_do_not_change_the_path(method, monkeypatch):
     # The low parts are part of a packet's state: many short launches end where one does, to the bit.
@@ -180,6 +182,7 @@ def test_launches_and_samples_do_not_change_the_path(method, monkeypatch):
         assert getattr(whole, name)[-1].tobytes() == getattr(parts, name)[-1].tobytes()
 
 
+@pytest.mark.ci
 def test_types_of_the_result():
     b = np.array([1e7 + 0.123456789, 0.1, -1e-3])
     result = run(one(free_scene((10.0, 12.0, 15.0)), b), t1=0.1)

@@ -25,6 +25,7 @@ def test_linear_momentum_without_forces(method):
     assert np.abs(momentum - momentum[0]).max() < 1e-11
 
 
+@pytest.mark.ci
 @pytest.mark.slow_for(*SLOW)
 @pytest.mark.parametrize("method", METHODS)
 def test_reversible(method):
@@ -35,6 +36,7 @@ def test_reversible(method):
         np.testing.assert_allclose(end, begin, atol=1e-11)
 
 
+@pytest.mark.ci
 @pytest.mark.slow_for(*SLOW)
 @pytest.mark.parametrize("method", METHODS)
 def test_energy_does_not_drift(method):

@@ -107,6 +107,7 @@ def test_a_fixed_number_of_newton_steps():
     assert difference(last(fixed), last(to_tolerance)) < 1e-13
 
 
+@pytest.mark.ci
 def test_turns_at_a_large_step():
     # Turns by 0.1 rad and more, where every digit of the series of the tangent counts.
     result = lw.solve(one(scene_of(()), **STATE), "psi_x8", h=0.2, t1=1.0, width=1)

@@ -471,6 +471,7 @@ def test_the_guess_alone_is_not_symplectic():
     assert defects[2] < 1e-10
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("name", PROGRAMS)
 def test_momenta_without_forces(name):
     # P = R p, L = R pi + b x P: round-off of 1000 steps, 3e-16 of the largest product each, in about ten operations.
@@ -503,6 +504,7 @@ def energies(name, I6, h, steps, newtons=None):
     return np.array(E) - coupled.energy(*NEAR, I6, tethered_potential)
 
 
+@pytest.mark.ci
 @pytest.mark.slow_but("x6")
 @pytest.mark.parametrize("name", ["x6", "x8", "psi_w"])
 def test_tether_energy_has_no_slope(name):
@@ -531,6 +533,7 @@ def test_tether_energy_over_1e5_steps(name):
     assert np.abs(E[-10_000:]).max() < 1.2 * np.abs(E[:10_000]).max()
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     ("name", "bounded", "tumbles"), [("x6", 2.13, 2.25), ("psi_w", 2.10, 2.2), ("psi_1_w", 1.99, 2.05)]
 )
@@ -608,6 +611,7 @@ def test_adjoint_is_the_inverse_backwards():
     assert spread(coupled.E(y, body, -0.02, DRAGS), x) > 1e-6
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("name", PROGRAMS)
 def test_order_two_with_drag_and_held_wrench(name):
     # t = 1, weight, buoyancy, a wrench constant in the body's axes and three directions of drag.

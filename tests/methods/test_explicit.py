@@ -144,6 +144,7 @@ def test_coupled_inertia(method, name):
     assert difference(*both(scene, body, method, 0.02, 5, test_coupled.STATE, **width)) < 5e-13
 
 
+@pytest.mark.ci
 @pytest.mark.slow_for("rk4-current*", "rk5*", "rk8*")
 @pytest.mark.parametrize(
     "current", [(), ({"type": "current", "velocity": (0.3, -0.2, 0.1)},)], ids=["still", "current"]

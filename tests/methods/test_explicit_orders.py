@@ -31,6 +31,7 @@ def run(scene):
     return solve
 
 
+@pytest.mark.ci
 @pytest.mark.slow_for("cg3", "rk5", "rk5_ck", "rk8")
 @pytest.mark.parametrize("method", STEPS)
 def test_order(method, run, example):
@@ -56,11 +57,13 @@ def drift(run):
     return of
 
 
+@pytest.mark.ci
 def test_R_leaves_the_group_at_the_order_of_the_method(drift):
     steps = (0.1, 0.05, 0.025)
     assert slope(steps, [drift("rk4", h) for h in steps]) > 3.85
 
 
+@pytest.mark.ci
 @pytest.mark.slow_but("rkmk4*")
 @pytest.mark.parametrize(("method", "h"), [("rk8", 0.025), ("rkmk4", 0.1), ("cg3", 0.02)])
 def test_R_stays_on_the_group(method, h, drift):

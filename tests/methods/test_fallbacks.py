@@ -35,6 +35,7 @@ def test_raise_keeps_the_result(scene):
         np.testing.assert_array_equal(getattr(caught.value.result, name), getattr(frozen, name))
 
 
+@pytest.mark.ci
 def test_raise_is_quiet_without_failures_and_about_events(scene):
     # The kernel of test_compositions.py, test_events_change_round_off_only. Up to 5 mm in about 0.6 s.
     box = lw.events.Box(lower=[-9.0, -9.0, -0.005], upper=[9.0, 9.0, 9.0])

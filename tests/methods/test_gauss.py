@@ -47,6 +47,7 @@ def test_coefficients(s):
         np.testing.assert_allclose(mine, printed, atol=1e-13)
 
 
+@pytest.mark.ci
 @pytest.mark.slow_but("gauss6")
 @pytest.mark.parametrize("name", GAUSS)
 def test_some_steps(name):
@@ -70,6 +71,7 @@ def run(scene, name, h, **named):
     return lw.solve(lw.Ensemble(scene, members=1), name, h=h, t1=5.0, save=lw.SaveAt(every=5.0), **named)
 
 
+@pytest.mark.ci
 @pytest.mark.slow_but("gauss6*")
 @pytest.mark.parametrize(("name", "steps"), [("gauss4", (0.1, 0.05, 0.025)), ("gauss6", (0.25, 0.2, 0.1)),
                                              ("gauss12", (1.0, 0.5))])  # fmt: skip
@@ -107,6 +109,7 @@ def test_each_iteration_gains_an_order(scene):
     assert np.log2(errors[0] / errors[1]) == pytest.approx(3.0, abs=0.1)
 
 
+@pytest.mark.ci
 def test_steps_that_do_not_contract(scene):
     # One member spins so fast that its iteration diverges; the other's bits do not change.
     spins = np.array([[0.3, 0.2, 0.1], [30.0, 20.0, 10.0]])
@@ -116,6 +119,7 @@ def test_steps_that_do_not_contract(scene):
     assert np.array_equal(alone.attitude[-1, 0], beside.attitude[-1, 0])
 
 
+@pytest.mark.ci
 def test_any_number_of_segments_gives_the_same_bits(scene):
     whole = lw.solve(lw.Ensemble(scene, members=3), "gauss6", h=0.1, t1=5.0, save=lw.SaveAt(every=5.0))
     sampled = lw.solve(lw.Ensemble(scene, members=3), "gauss6", h=0.1, t1=5.0, save=lw.SaveAt(every=0.1))

@@ -85,6 +85,7 @@ def test_float32(shape, method):
     assert difference(kernel, twin) < 2.3e-5
 
 
+@pytest.mark.ci
 @pytest.mark.slow_but("psi_s-*")
 @pytest.mark.parametrize(("method", "key"), [("psi", "Psi"), ("psi_s", "PsiS"), ("psi_1", "Psi1")])
 def test_float32_on_the_paper_example(method, key, example, scene):

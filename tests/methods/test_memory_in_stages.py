@@ -98,6 +98,7 @@ def test_the_twin_keeps_the_order(name, body, truth):
     assert slope(STEPS[name], errors) == pytest.approx(ORDERS[name], abs=0.1 * ORDERS[name])
 
 
+@pytest.mark.ci
 def test_a_turn_within_a_step_costs_order(body, truth):
     # 1 / 15 s never ends at half time, where the command of the thruster has a kink: the velocity loses h^2 once.
     steps = np.array([1 / 15, 1 / 31])

@@ -55,6 +55,7 @@ def test_a_sphere():
     np.testing.assert_allclose(F, exact, atol=1e-14)
 
 
+@pytest.mark.ci
 def test_too_large():
     # psi_s makes two solves over half the step; weight and moment, which stay in the kernel, change nothing here.
     scene = scene_of(*SHAPES["full mass"], net=-1e-9, moment=(0.0, 0.0, -1e-9))

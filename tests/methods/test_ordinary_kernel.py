@@ -8,6 +8,7 @@ from benchmarks.cases.ordinary.kernel import command
 from tests.support.tools import difference, expected
 
 
+@pytest.mark.ci
 @pytest.mark.slow_for("*-psi-*")
 @pytest.mark.parametrize(("method", "key"), [("psi", "Psi_h0.01"), ("psi_s", "PsiS_h0.01")])
 @pytest.mark.parametrize(("steps", "when", "bound"), [(1, "one_step", 1e-13), (500, "5", 1e-11)])

@@ -160,6 +160,7 @@ def test_gauss_coefficients(s):
     np.testing.assert_allclose(g.ahead @ g.c ** (s - 1), (1.0 + g.c) ** (s - 1), rtol=1e-10)
 
 
+@pytest.mark.ci
 @pytest.mark.slow_for("2-*", "4-*")
 @pytest.mark.parametrize(
     ("s", "steps"), [(2, (0.1, 0.05)), (3, (0.25, 0.125)), (4, (0.5, 0.25)), (5, (1.0, 0.5)), (6, (1.0, 0.5))]
@@ -175,6 +176,7 @@ def test_gauss_reaches_the_truth(body, start, example):
     assert errors(x, body, expected(example["truth"]["5"])).max() < 1e-13
 
 
+@pytest.mark.ci
 def test_gauss_keeps_quadratic_invariants():
     # R^T R = I, and without forces |p|^2, p.pi and R p, which are quadratic in y: round-off of 100 steps.
     body = body_of()
@@ -191,6 +193,7 @@ def test_gauss_keeps_quadratic_invariants():
     assert 1e-9 < change([energy.angular_momentum(x) for x in states]) < 1e-1
 
 
+@pytest.mark.ci
 def test_methods_agree_with_all_laws():
     # Independent methods at small steps: drag, held wrench, a current that varies in space and time.
     body = body_of(*CONSERVATIVE, *WATER, *DISSIPATIVE, excess=0.3)
@@ -265,6 +268,7 @@ def free_body(x, body, h, order, t1=2.0):
     return x
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(("order", "steps"), [(2, (0.1, 0.05, 0.025)), (4, (0.2, 0.1, 0.05)), (6, (0.2, 0.1, 0.05)),
                                               (8, (0.4, 0.25, 0.2)), (10, (0.5, 0.4, 0.25))])  # fmt: skip
 def test_order_of_the_rotation(order, steps):

@@ -25,6 +25,7 @@ def close(x, y, within=WITHIN):
     return x == y or abs(x / y - 1.0) < within
 
 
+@pytest.mark.ci
 @pytest.mark.slow_but("psi_s")
 @pytest.mark.parametrize("method", KNOWN)
 def test_munk_oscillation_of_a_large_angle(method):
@@ -53,6 +54,7 @@ def started(method, hw, steps):
     return np.arctan2(R[:, 0, 1], R[:, 1, 1]), size / size[0]
 
 
+@pytest.mark.ci
 def test_above_two_an_oscillation_jumps_from_side_to_side():
     angle, _ = started("psi_s", 2.05, 400)
     assert np.all(angle[1:] * angle[:-1] < 0.0)
@@ -74,6 +76,7 @@ def test_explicit_methods_gain_momentum_up_to_the_linear_limit():
 SOLVED = [m for m in METHODS if not m.startswith("gauss")]
 
 
+@pytest.mark.ci
 @pytest.mark.slow_but("munk-psi_s")
 @pytest.mark.parametrize("method", SOLVED)
 @pytest.mark.parametrize("motion", ["munk", "restoring"])

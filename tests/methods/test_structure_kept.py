@@ -59,6 +59,7 @@ def test_phi_keeps_a_shifted_angular_momentum(method, sign):
     assert change(L) > 1e-4
 
 
+@pytest.mark.ci
 def test_psi_keeps_neither_but_within_the_square_of_the_step():
     steps = np.array([0.04, 0.02, 0.01])
     changes = [change(free_run("general", "psi", h, steps=round(200.0 / h))[2]) for h in steps]
@@ -120,6 +121,7 @@ def test_symplectic(method):
     assert symplectic_defect(method, 0.05, (1.0, 1.2, 6.0)) < 1e-9
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     ("method", "order"), [("rk4", 4), *(pytest.param(*row, marks=slow) for row in (("gauss4", 4), ("cg3", 3)))]
 )
@@ -136,6 +138,7 @@ def test_the_papers_maps_are_symplectic_for_isotropic_mass(method):
     assert symplectic_defect(method, 0.1, EQUAL) < 1e-9
 
 
+@pytest.mark.ci
 def test_psi_is_not_symplectic_for_anisotropic_mass():
     # Section 2 of the mathematics: the defect is O(h^3).
     steps = np.array([0.2, 0.1, 0.05])

@@ -304,6 +304,7 @@ def test_a_file_holds_them(tmp_path):
         np.testing.assert_array_equal(again.part(np.array([2, 0])).jacobian[name], slopes[:, [2, 0]])
 
 
+@pytest.mark.ci
 def test_members_have_slopes_of_their_own():
     masses = np.array([18.0, 20.0, 25.0, 31.0, 20.0, 22.0, 23.0, 24.0, 26.0, 20.0])
     fleet = lw.Ensemble(falling(), sampling=lw.designs.Table({"vehicle.mass": masses}))

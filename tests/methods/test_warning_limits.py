@@ -14,6 +14,7 @@ from lgvi_warp.methods import limits
 KNOWN = {"phi": 1.41, "psi": 1.50, "psi_s": 2.13, "psi_1": 2.00, "cg3": 1.69, "rkmk4": 2.43}
 
 
+@pytest.mark.ci
 def test_the_default_method():
     assert limit(munk, "psi_s") == pytest.approx(limits.MUNK["psi_s"], rel=0.05)
 

@@ -60,6 +60,7 @@ def test_program_is_the_printed_map(method, solver):
 
 
 # Growth of round-off (mathematics, section 4): 1e-13 after a step, 1e-11 at t = 5, 1e-9 at t = 50.
+@pytest.mark.ci
 @pytest.mark.slow_for("*-50-*")
 @pytest.mark.parametrize(("time", "steps", "bound"), [("one_step", 1, 1e-13), ("5", 500, 1e-11), ("50", 5000, 1e-9)])
 @pytest.mark.parametrize("method", KEYS)

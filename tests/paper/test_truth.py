@@ -49,6 +49,7 @@ def run(scene):
 
 # Errors at t = 5 and 50 with h = 0.01 follow from those at t = 2, h = 0.0125 (order) and the growth of errors; the
 # published states of each method give them to all digits: error of the method itself, method state minus truth.
+@pytest.mark.ci
 @pytest.mark.parametrize(("method", "key"), [("phi", "Phi"), ("psi", "Psi"), ("psi_s", "PsiS"), ("psi_1", "Psi1")])
 @pytest.mark.parametrize("t1", [5, 50])
 def test_error_against_truth(method, key, t1, run, example):
@@ -66,6 +67,7 @@ def test_errors_at_two_seconds(method, run):
         assert abs(value - float(printed)) <= 1.01 * half_digit(printed)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(("method", "order"), ORDERS.items())
 def test_order(method, order, run, example):
     # Steps small enough for the leading term, errors far above round-off (1e-12): the slope is the order within 3 %.
@@ -95,6 +97,7 @@ def test_compositions_reach_the_published_errors(run, example):
     assert errors(run("kl8(psi_s)", 0.25, 5.0)[1], truth)[1] == pytest.approx(6e-9, rel=0.1)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("method", FIGURE_1)
 def test_energy_of_figure_1(method, run):
     result, _ = run(method, 0.01, 150.0, lw.SaveAt(every=0.01))

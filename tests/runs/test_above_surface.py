@@ -133,6 +133,7 @@ def test_a_start_at_the_surface_counts_and_one_above_it_is_told_of_by_itself():
     assert any(text.startswith("start.position") for text in result.messages)
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_a_moved_origin_is_undone():
     """The user's origin, though the method's is that of the mass: a hull whose origin is 2 m above its centre."""

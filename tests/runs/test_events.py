@@ -300,6 +300,7 @@ def test_the_first_of_two_events_in_a_step():
         assert r.end_time[0] == pytest.approx(1.0, abs=1e-12)
 
 
+@pytest.mark.ci
 def test_what_is_no_number_is_no_event():
     b, R, nu, Om = random_states(2, 8)
     Om[3] = 1e200

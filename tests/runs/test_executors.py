@@ -189,6 +189,7 @@ def test_dask(client, memory, tmp_path):
     assert same(stored, memory)
 
 
+@pytest.mark.ci
 def test_threads_of_one_dask_worker_share_it(memory):
     """Each thread takes a block of its own; a run that ends early leaves none at work."""
     from distributed import Client, LocalCluster
@@ -305,6 +306,7 @@ def test_a_worker_of_another_kind_is_refused(client, monkeypatch):
         lw.solve(fleet(300), **SETTINGS, executor=Dask(client))
 
 
+@pytest.mark.ci
 def test_an_executor_of_your_own(memory):
     class Backwards:
         def run(self, work, blocks, advanced):
@@ -314,6 +316,7 @@ def test_an_executor_of_your_own(memory):
     assert same(lw.solve(fleet(), **SETTINGS, executor=Backwards()), memory)
 
 
+@pytest.mark.ci
 def test_threads_ask_numpy_to_read_no_types(memory, monkeypatch):
     """Python before 3.11.8 fails now and then to parse in several threads at once (python/cpython#106905)."""
 

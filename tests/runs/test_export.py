@@ -366,6 +366,7 @@ def test_faults(result, tmp_path, monkeypatch):
         lw.export(5, "a.csv")
 
 
+@pytest.mark.ci
 def test_any_value_of_where_a_result_comes_from_may_be_another(result, tmp_path):
     """A file from elsewhere is exported, or refused by a SceneError."""
     arrays = dict(np.load(result.save(tmp_path / "good.npz")))

@@ -114,6 +114,7 @@ def test_runs_that_start_together(complete, tmp_path, mode, count):
     assert [one.name for one in path.parent.iterdir()] == ["run.zarr"]
 
 
+@pytest.mark.ci
 def test_threads_of_one_process_are_kept_apart_as_well(complete, tmp_path):
     path, said = tmp_path / "run.zarr", []
 
@@ -317,6 +318,7 @@ def test_what_no_run_wrote_is_not_overwritten(complete, tmp_path, name, verb, ca
     assert tree(tmp_path) == before
 
 
+@pytest.mark.ci
 def test_a_link_is_not_overwritten_but_what_it_leads_to(complete, tmp_path):
     """A run on another disk; a link within a run is no run's."""
     shutil.copytree(complete, tmp_path / "disk" / "run.zarr")
@@ -340,6 +342,7 @@ def test_a_damaged_run_may_be_overwritten(complete, tmp_path):
         assert differing(complete, path) == []
 
 
+@pytest.mark.ci
 def test_an_empty_folder_is_taken(complete, tmp_path):
     (tmp_path / "run.zarr").mkdir()
     lw.solve(fleet(), **SETTINGS, store=tmp_path / "run.zarr")
@@ -378,6 +381,7 @@ def test_folders_are_exchanged_in_one_step(tmp_path):
     assert (os.listdir(tmp_path / "a"), os.listdir(tmp_path / "b")) == (["b"], ["a"])
 
 
+@pytest.mark.ci
 def test_nobody_elses_folder_beside_a_run_is_removed(complete, tmp_path):
     """The names that earlier versions took for their own, and one of ours that holds notes."""
     mark = f"{scratch.host()}-{2**22 + 5}-0123abcd"

@@ -63,6 +63,7 @@ def test_children_run_as_their_parent(long, way):
     check(long, way)
 
 
+@pytest.mark.ci
 def test_the_parent_goes_on_as_before(quick):
     assert quick["parent again"] == quick["parent"]
 

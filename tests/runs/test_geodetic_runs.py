@@ -55,6 +55,7 @@ def test_members_at_places_of_their_own_are_stored_and_resumed(tmp_path):
         np.testing.assert_array_equal(stored.samples[name], whole.samples[name])
 
 
+@pytest.mark.ci
 def test_a_run_far_from_its_origin_says_so():
     far = lw.Scene.named("remus_100", environment=WATER, start={"geodetic": [66.44, 10.40, 5.0]})
     messages = lw.solve(far, **SETTINGS | {"t1": 0.5, "save": None}).messages

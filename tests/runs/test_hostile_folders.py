@@ -351,6 +351,7 @@ def test_a_link_that_is_put_there_meanwhile_is_not_followed(theirs, home):
     assert os.listdir(home / "work") == ["c.0"]
 
 
+@pytest.mark.ci
 def test_the_user_may_name_a_link_himself(good, theirs, tmp_path):
     """A run may lie on another disk, as on clusters."""
     disk, link = theirs("store") / "run.zarr", tmp_path / "mine.zarr"

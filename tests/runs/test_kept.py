@@ -110,6 +110,7 @@ def test_a_part_is_sent_as_what_it_is():
     assert (again.spec, again.fields, again.ensemble.members) == (part.spec, ("position",), 1)
 
 
+@pytest.mark.ci
 def test_no_failures_leave_no_group(tmp_path):
     result = lw.solve(fleet(), **SETTINGS, keep="failed", store=tmp_path / "run.zarr")
     assert result.kept is None
@@ -263,6 +264,7 @@ def test_parts_are_merged_with_their_kept_members(complete, tmp_path):
     assert differing(complete, again.path) == []
 
 
+@pytest.mark.ci
 def test_the_last_part_into_one_folder_runs_them(complete, tmp_path):
     path = tmp_path / "run.zarr"
     for only in (range(2, 4), range(0, 2)):

@@ -33,6 +33,7 @@ def test_a_short_run_measures_nothing(measured_widths):
     assert clock.readings == 0
 
 
+@pytest.mark.ci
 def test_a_run_that_turns_out_short_keeps_its_width(measured_widths):
     plan = plan_of(members=2_000_000)
     # 16 million vehicle-steps of 1 us.

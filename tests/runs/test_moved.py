@@ -102,6 +102,7 @@ def test_the_same_run_is_told_by_the_tables_checksum(project, tmp_path):
         lw.solve(fleet(written(tmp_path / "members.csv", 1)), **SETTINGS, store=store)
 
 
+@pytest.mark.ci
 def test_parts_with_a_table_each_are_of_one_run(tmp_path):
     for name, only in (("a", range(0, 2)), ("b", range(2, 3))):
         table = written(tmp_path / name / "members.csv")

@@ -50,6 +50,7 @@ def test_rows_have_the_noise_of_the_members_that_are_named(noisy):
     assert (run(X[:4], seed=1) != run(X[:4])).any(axis=1).all()
 
 
+@pytest.mark.ci
 def test_a_seed_beside_levels_is_that_of_the_noise_alone():
     quiet = lw.Scene(BODY, terms=[lw.terms.Drag(linear=(DRAG,) * 6)])
     run = lw.prepare(

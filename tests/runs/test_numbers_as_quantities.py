@@ -30,6 +30,7 @@ def of_members(result, name):
     return np.asarray(lw.gather(result, [lw.statistics.Mean(name)])[f"mean {name}"].value).ravel()[-1]
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("kept", ["memory", "file", "store"])
 def test_means_are_those_of_what_was_drawn(fleet, tmp_path, kept):
     if kept == "store":
@@ -61,6 +62,7 @@ def test_an_estimate_and_a_probability_follow_the_normal_distribution(fleet):
     assert rare.interval[0] <= 1.0 - far.cdf(weight + 3.5) <= rare.interval[1]
 
 
+@pytest.mark.ci
 def test_a_derivative_by_itself_is_one(fleet):
     found = lw.derivatives(fleet.subset(np.arange(8)), ["vehicle.buoyancy"], by=["vehicle.buoyancy"], **RUN)
     np.testing.assert_allclose(found.jacobian, 1.0, rtol=1e-9)
@@ -76,6 +78,7 @@ def test_a_set_point_is_taken_from_a_depth():
     np.testing.assert_allclose(found.mean, (depth - fleet.numbers(0, 20)["set_point.depth"]).mean(), rtol=1e-12)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     ("of", "words"),
     [
@@ -96,6 +99,7 @@ def test_what_names_no_number_is_told_with_the_remedy(fleet, of, words):
     assert not [word for word in words if word not in str(refused.value)], refused.value
 
 
+@pytest.mark.ci
 def test_a_function_of_a_result_has_the_samples_that_the_user_chose(fleet):
     kept = []
 

@@ -160,6 +160,7 @@ def test_ends_are_marked_and_counted_by_outcome(mixed):
     np.testing.assert_allclose(marks(above, Status.FLOOR), 0.0, atol=1e-6)
 
 
+@pytest.mark.ci
 def test_failures_are_drawn_until_they_fail(mixed):
     some = ending(mixed, [1, 1, 1, 0, 0, 2, 17], [2.0, 2.0, 4.0, np.nan, np.nan, 6.0, 5.0])
     panels, head = drawn(some)

@@ -78,6 +78,7 @@ def test_a_second_solve_builds_no_kernel():
     assert make_advance.cache_info().misses == before
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("names", [("su4(psi_s)", "kl6(psi_s)", "su8_15(psi_s)"), ("bm4(psi_x)", "bm6(psi_x)")])
 def test_compositions_of_a_method_share_its_kernel(names):
     """Their coefficients are numbers that the kernel gets, unless a law asks for the time within a step."""
@@ -98,6 +99,7 @@ def test_varying_a_parameter_compiles_nothing_else(scene):
     assert shared.kernel.advance is varied.kernel.advance
 
 
+@pytest.mark.ci
 def test_varied_parameters_act_on_their_member():
     # A free fall in vacuum: v = net t / M, member by member.
     scene = scene_of((2.0, 2.0, 2.0), net=1.0)
@@ -171,6 +173,7 @@ def test_any_choice_of_fields_takes_the_same_kernel_and_its_own_memory(scene):
         _ = lw.solve(fleet, h=0.01, t1=0.1, save=lw.SaveAt(fields=("velocity",))).position
 
 
+@pytest.mark.ci
 def test_progress_reaches_one(scene):
     seen = []
     lw.solve(lw.Ensemble(scene, 300), h=0.01, t1=0.5, threads=1, progress=seen.append)
@@ -189,6 +192,7 @@ def test_settings_are_refused(scene, named, text):
         lw.solve(lw.Ensemble(scene), **({"h": 0.01, "t1": 1.0} | named))
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("threads", [1, 3])
 def test_an_exception_on_the_way_stops_the_run(scene, threads):
     seen = []
@@ -203,6 +207,7 @@ def test_an_exception_on_the_way_stops_the_run(scene, threads):
     assert len(seen) <= 2 * threads
 
 
+@pytest.mark.ci
 def test_solve_prints_nothing(scene, capfd):
     lw.solve(lw.Ensemble(scene, 3), h=0.013, t1=0.1)
     lw.solve(scene_of(), h=0.01, t1=0.1)

@@ -29,6 +29,7 @@ def short(monkeypatch):
     monkeypatch.setattr(prediction, "PROBE_BYTES", 4_000_000)
 
 
+@pytest.mark.ci
 def test_the_disk_is_that_of_the_run(tmp_path):
     path = tmp_path / "run.zarr"
     found = lw.predict(fleet(), **SETTINGS, store=path)
@@ -39,6 +40,7 @@ def test_the_disk_is_that_of_the_run(tmp_path):
     assert found.disk == pytest.approx(sum(map(len, tree(path).values())), rel=1e-3)
 
 
+@pytest.mark.ci
 def test_a_step_that_does_not_fit_is_said_to_be_shortened():
     found = lw.predict(fleet(), **{**SETTINGS, "h": 0.9 * SETTINGS["h"]})
     (message,) = found.messages
@@ -47,6 +49,7 @@ def test_a_step_that_does_not_fit_is_said_to_be_shortened():
     assert lw.predict(fleet(), **SETTINGS).messages == ()
 
 
+@pytest.mark.ci
 def test_the_memory_of_a_result_is_counted():
     plan = make_plan(fleet(), **SETTINGS)
     result = lw.solve(fleet(), **SETTINGS)
@@ -91,6 +94,7 @@ def test_a_run_takes_about_what_was_said():
     assert 0.25 < sorted(ratios)[1] < 4.0
 
 
+@pytest.mark.ci
 def test_the_command(tmp_path, capsys):
     arguments = ["predict", str(ROOT / "examples" / "paper.toml"), "--members", "500", "--duration", "2",
                  "--set", "run.save_every=0.5", "--store", "zarr", "--out", str(tmp_path / "x")]  # fmt: skip
@@ -106,6 +110,7 @@ def test_too_little_room_is_said():
     says(text, "2.0 h", "100% of the memory", "Use --store zarr", "more than the disk holds")
 
 
+@pytest.mark.ci
 def test_statistics_without_samples_take_little(tmp_path):
     own = {"statistics": [lw.statistics.Mean("position")], "keep": "none"}
     path = tmp_path / "run.zarr"

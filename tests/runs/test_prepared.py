@@ -51,6 +51,7 @@ def solved(scene, names, X, **settings):
     return lw.solve(fleet, **settings)
 
 
+@pytest.mark.ci
 def test_quantities_are_those_of_solve(paper):
     run = lw.prepare(paper, NAMES, of=["position[2]", "norm(velocity)"], **SETTINGS)
     assert run.names == tuple(NAMES)
@@ -74,6 +75,7 @@ def test_a_result_without_quantities_is_that_of_solve(paper):
     assert result.provenance["ensemble"]["members"] == 20
 
 
+@pytest.mark.ci
 def test_columns_may_have_names(paper):
     run = lw.prepare(paper, NAMES, of="depth", **SETTINGS)
     X = numbers(5)
@@ -81,6 +83,7 @@ def test_columns_may_have_names(paper):
     np.testing.assert_array_equal(run({name: by_name[name] for name in NAMES[::-1]}), run(X))
 
 
+@pytest.mark.ci
 def test_members_may_be_drawn(paper):
     vary = {"vehicle.mass": Normal(relative=0.01), "start.angular_velocity": Normal(std=0.1)}
     run = lw.prepare(lw.Ensemble(paper, 40, 7, vary), of="position", **SETTINGS)
@@ -95,6 +98,7 @@ def test_members_may_be_drawn(paper):
         run(np.ones((1, 4)), members=1)
 
 
+@pytest.mark.ci
 def test_another_seed_draws_the_same_members_anew(paper):
     vary = {"vehicle.mass": Normal(relative=0.01)}
     run = lw.prepare(lw.Ensemble(paper, 40, 7, vary).subset([3, 30]), of="position", **SETTINGS)
@@ -207,6 +211,7 @@ def test_other_members_may_need_another_kernel():
         np.testing.assert_array_equal(run(np.array(X)), solved(scene, names, X, **SHORT).position[-1])
 
 
+@pytest.mark.ci
 def test_paths_are_kept_of_some_members_at_a_time(paper, monkeypatch):
     run = lw.prepare(paper, NAMES, of=["max(depth)", "depth"], save=lw.SaveAt(every=0.1), failed="nan", **SETTINGS)
     X = numbers(300)
@@ -229,6 +234,7 @@ def test_paths_are_kept_of_some_members_at_a_time(paper, monkeypatch):
 CHANGES = [([], 0.0), ([1], 0.1), ([0], 0.5), ([2], -0.5), ([0, 1, 2], 0.2), ([1], 1e-16), ([], 0.0), ([1], -0.3)]
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("members", [1, 5])
 def test_nothing_of_the_call_before_is_left(paper, members):
     run, X = lw.prepare(paper, NAMES, of="position", **SETTINGS), numbers(members)
@@ -281,6 +287,7 @@ def test_noise_of_a_call_is_its_own():
         np.testing.assert_array_equal(run(X, seed=seed, indices=indices), lw.solve(fleet, **SHORT).position[-1])
 
 
+@pytest.mark.ci
 def test_a_call_computes_nothing_again_that_follows_from_the_same_numbers(monkeypatch):
     scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]})
     names, X = ["start.velocity[0]", "drag_matrix.quadratic[1,1]"], np.array([[1.5, 150.0]])
@@ -307,6 +314,7 @@ def counted(counts, function):
     return call
 
 
+@pytest.mark.ci
 def test_threads_may_call_at_once(paper):
     run = lw.prepare(paper, NAMES, of="position", threads=1, **SETTINGS)
     inputs = [numbers(17 + i % 3, i) for i in range(40)]
@@ -409,6 +417,7 @@ def test_laws_remember_nothing_of_the_call_before():
         np.testing.assert_array_equal(run(X), solved(scene, names, X, **SHORT).position[-1])
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("columns", [(5,), (2, 5)])
 def test_packets_take_members_whose_laws_have_other_rows(columns):
     """Turned axes: a drag matrix has as many rows as some member has columns, and the thrusters' rows come after them."""

@@ -45,23 +45,27 @@ def same(x, y, members=slice(None)):
     return all(getattr(x, f)[:, members].tobytes() == getattr(y, f).tobytes() for f in FIELDS)
 
 
+@pytest.mark.ci
 def test_threads(fleet, run):
     assert len(blocks(fleet.members)) > 3
     reference = run(fleet, threads=1)
     assert all(same(reference, run(fleet, threads=threads)) for threads in (2, 3, 4))
 
 
+@pytest.mark.ci
 def test_order_of_members(fleet, run):
     order = np.random.default_rng(1).permutation(fleet.members)
     assert same(run(fleet), run(fleet.subset(order)), order)
 
 
+@pytest.mark.ci
 def test_alone_or_among_others(fleet, run):
     reference = run(fleet)
     for member in (0, 513, 1002):
         assert same(reference, run(fleet.subset([member])), [member])
 
 
+@pytest.mark.ci
 def test_samples_do_not_change_the_path(fleet):
     dense = lw.solve(fleet, h=0.01, t1=0.75, save=lw.SaveAt(every=0.01))
     sparse = lw.solve(fleet, h=0.01, t1=0.75)

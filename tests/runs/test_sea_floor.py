@@ -141,6 +141,7 @@ def test_of_two_floors_and_a_box_the_first_counts():
         assert ended == {key: float(key == name) for key in ended}
 
 
+@pytest.mark.ci
 def test_members_have_a_clearance_or_a_floor_of_their_own():
     b, v = runs(11)
     clearance = np.linspace(0.0, 5.0, 11)
@@ -170,6 +171,7 @@ def test_outside_the_edge_holds_and_edges_stop():
     assert r.end_time[0] == pytest.approx(10.0, abs=1e-9)
 
 
+@pytest.mark.ci
 def test_a_member_below_the_floor_or_that_is_no_number():
     floor = grid_of(lambda x, y: 20.0 + 0.1 * x)
     b = np.array([[0.0, 0.0, 19.0], [0.0, 0.0, 21.0], [-30.0, 0.0, 19.0], [0.0, 0.0, 1.0]])
@@ -182,6 +184,7 @@ def test_a_member_below_the_floor_or_that_is_no_number():
     assert any("2 of 4 members begin at or beyond an event (floor 2; the first: member 1)" in m for m in r.messages)
 
 
+@pytest.mark.ci
 def test_a_ridge_that_one_step_leaps_over_is_not_seen_and_half_the_step_sees_it():
     # A ridge one cell wide, 0.3 m above the way; the step is 4 m long, the way within the ridge 1.2 m.
     nodes = [np.arange(0.0, 42.0, 2.0), np.array([0.0, 1.0])]

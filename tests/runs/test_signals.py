@@ -89,6 +89,7 @@ def check_part(path, total=4096):
     return part.members
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     "name", ["SIGTERM", *(pytest.param(name, marks=pytest.mark.slow) for name in ("SIGINT", "SIGHUP"))]
 )
@@ -329,6 +330,7 @@ def test_the_second_signal_ends_the_process():
         assert (signals.exit_code, signals.text) == (129, "interrupted by SIGHUP")
 
 
+@pytest.mark.ci
 def test_solve_gives_what_is_finished():
     whole = lw.solve(fleet(), **SETTINGS, statistics=[lw.statistics.Mean("position")])
     with pytest.raises(lw.Interrupted, match="the first 512 of 1,003 members were finished") as caught:

@@ -65,6 +65,7 @@ def drawn(name, varied, members):
     return lw.Ensemble(scene, members, 3, vary)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("dtype", ["float64", "float32", "float32_compensated"])
 @pytest.mark.parametrize("method", ["psi", "psi_s", "psi_x", "rk4", lw.Method("rk5", rtol=1e-6, atol=1e-6)])
 @pytest.mark.parametrize("name", SCENES)

@@ -69,6 +69,7 @@ def same(first, second):
     )
 
 
+@pytest.mark.ci
 def test_statistics_are_those_of_the_samples(complete):
     s, b = complete.statistics, complete.position
     speed = np.linalg.norm(complete.velocity, axis=-1)
@@ -87,6 +88,7 @@ def test_statistics_are_those_of_the_samples(complete):
     np.testing.assert_allclose(ranks, (0.05, 0.5, 0.95), atol=s["quantiles depth"]["rank_error"][-1] + 1 / 1003)
 
 
+@pytest.mark.ci
 def test_quantities_are_those_of_the_result(fleet, complete):
     inertial = np.einsum("knij,knj->kni", complete.attitude, complete.velocity)
     names = ("velocity_inertial", "attitude", "angular_velocity", "speed")
@@ -98,6 +100,7 @@ def test_quantities_are_those_of_the_result(fleet, complete):
     assert found["mean attitude"].coordinates["component"][5] == "attitude[1, 2]"
 
 
+@pytest.mark.ci
 def test_what_is_too_large_to_square_says_so(fleet):
     states = [
         np.array(getattr(fleet.select(0, 500), name))
@@ -123,6 +126,7 @@ def test_every_statistic_is_among_them():
     assert {one.type for one in EVERY} == {word for word, kind in TYPES.items() if not kind.ticks}
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("threads", [1, 2, 3])
 def test_threads_change_no_bit(fleet, complete, threads):
     alone = lw.solve(fleet, **SETTINGS, statistics=EVERY, keep="none", threads=threads)
@@ -143,17 +147,20 @@ class Ordered:
             yield blocks[i], work(blocks[i])
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("order", [(3, 2, 1, 0), (2, 0, 3, 1)])
 def test_the_order_in_which_blocks_finish_changes_no_bit(fleet, complete, order):
     found = lw.solve(fleet, **SETTINGS, statistics=EVERY, keep="none", executor=Ordered(order))
     assert same(found.statistics, complete.statistics)
 
 
+@pytest.mark.ci
 def test_segments_change_no_bit(fleet, complete, monkeypatch):
     monkeypatch.setattr("lgvi_warp.engine.launches.SEGMENT_SAMPLE_BYTES", 1)
     assert same(lw.solve(fleet, **SETTINGS, statistics=EVERY, keep="none").statistics, complete.statistics)
 
 
+@pytest.mark.ci
 def test_parts_pass_through_files(fleet, complete, tmp_path):
     """A store may keep a block's part, and merge it later: to the same bits, in any order."""
     plan = make_plan(fleet, **SETTINGS)
@@ -193,6 +200,7 @@ def test_intervals_of_dependent_members_are_said_to_be(scene, complete, sampling
     assert bool(text) == bool(words)
 
 
+@pytest.mark.ci
 def test_the_result_keeps_its_statistics(fleet, complete, tmp_path):
     r = lw.solve(fleet, **SETTINGS, statistics=EVERY, keep=[3, 1002])
     back = lw.Result.load(r.save(tmp_path / "r.npz"))
@@ -207,6 +215,7 @@ def test_the_result_keeps_its_statistics(fleet, complete, tmp_path):
     json.dumps(r.provenance)
 
 
+@pytest.mark.ci
 def test_kept_members_are_those_of_the_whole(fleet, complete):
     kept = lw.solve(fleet, **SETTINGS, keep=[1002, 513, 0]).kept
     assert all(kept.samples[f].tobytes() == complete.samples[f][:, [0, 513, 1002]].tobytes() for f in FIELDS)
@@ -392,6 +401,7 @@ def falling(n=20_000):
     return lw.Ensemble(lw.Scene(base.vehicle, base.environment, start=lw.Start(position=[0, 0, 10])), n, 1, vary)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("threads", [1, 2, 3])
 def test_a_run_stops_when_it_knows_enough(threads):
     until = lw.Until("mean position[2]", 0.05)
@@ -412,6 +422,7 @@ def test_a_run_stops_when_it_knows_enough(threads):
     assert len(r.failure_time) == r.members
 
 
+@pytest.mark.ci
 def test_a_run_stops_when_it_knows_enough_of_paths():
     ask = {"h": 0.1, "t1": 1.0, "keep": "none", "statistics": [PathTime("depth", above=10)]}
     r = lw.solve(falling(), **ask, until=lw.Until("mean path_time depth above 10.0", 0.02))
@@ -419,6 +430,7 @@ def test_a_run_stops_when_it_knows_enough_of_paths():
     assert r.statistics["mean path_time depth above 10"].half_width[0, 0] <= 0.02
 
 
+@pytest.mark.ci
 def test_an_expression_over_the_path_is_what_the_statistic_of_paths_is():
     ask = {"h": 0.1, "t1": 1.0, "save": lw.SaveAt(every=0.2), "keep": "none"}
     pairs = {
@@ -443,6 +455,7 @@ def test_an_expression_over_the_path_is_what_the_statistic_of_paths_is():
     assert "reached with" in r.messages[-1]
 
 
+@pytest.mark.ci
 def test_a_run_says_when_it_does_not_know_enough():
     r = lw.solve(falling(2000), h=0.1, t1=1.0, keep="none", until=lw.Until("mean depth", 1e-9))
     assert r.members == 2000
@@ -479,6 +492,7 @@ def designed(scene):
     }
 
 
+@pytest.mark.ci
 def test_a_smooth_mean_is_known_much_better_by_replicates(designed):
     halves = {name: r.statistics["mean position"].half_width[-1] for name, r in designed.items()}
     replicated, latin = (halves[name] for name in halves if not isinstance(name, str))
@@ -511,6 +525,7 @@ def test_values_of_replicates_are_those_of_the_samples(designed):
     assert found["first_passage depth above 12.0"].value[-1] == pytest.approx(passed, rel=1e-12)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("threads", [1, 3])
 def test_threads_change_no_bit_of_replicates(designed, scene, threads):
     fleet = lw.Ensemble(scene, 1024, 1, STARTS, Sobol(replicates=16))
@@ -527,6 +542,7 @@ def test_chosen_members_of_a_design_are_no_design(scene):
     assert any("those of independent members" in text for text in part.messages)
 
 
+@pytest.mark.ci
 def test_a_run_of_replicates_stops_at_a_power_of_two():
     base = falling()
     fleet = lw.Ensemble(base.scene, 20_480, 1, {"start.position": Normal(std=1.0)}, Sobol(replicates=8))
@@ -558,6 +574,7 @@ def test_what_a_run_refuses(scene, inputs, text):
         lw.solve(lw.Ensemble(scene, 3), **SETTINGS, **inputs)
 
 
+@pytest.mark.ci
 def test_a_function_of_ones_own(fleet, complete):
     def drop(samples, members):
         return samples["position"][..., 2] - members.position[None, :, 2]
@@ -575,6 +592,7 @@ def test_a_function_of_ones_own(fleet, complete):
         lw.solve(fleet, **SETTINGS, statistics=[Mean(two)])
 
 
+@pytest.mark.ci
 def test_float32_is_summed_up_in_float64(fleet):
     ask = [Mean("position"), Covariance("position"), Quantiles("position", (0.1, 0.9)), Quantiles("speed", (0.5,))]
     found = lw.solve(
@@ -591,6 +609,7 @@ def test_float32_is_summed_up_in_float64(fleet):
     assert deepest == pytest.approx(np.median(b[..., 2].max(axis=0)), rel=1e-15)
 
 
+@pytest.mark.ci
 def test_only_the_fields_that_statistics_need_are_written(fleet):
     settings = observation.observe(fleet, [Mean("depth")], "none")
     assert settings.fields(FIELDS) == ("position",)
@@ -723,6 +742,7 @@ def test_the_command_prints_and_draws_them(path, tmp_path, capsys):
     assert cli.main(["run", str(path), "--error", "1e-3", "--out", str(out)]) == 2
 
 
+@pytest.mark.ci
 def test_no_statistics_cost_nothing(fleet):
     settings = observation.observe(fleet)
     assert settings == observation.Observation()
@@ -750,6 +770,7 @@ def test_memory_grows_with_neither_members_nor_steps():
     assert peak(few, 100) - peak(few, 10) < 100_000
 
 
+@pytest.mark.ci
 def test_a_run_stops_at_the_same_block_in_whatever_order_they_finish():
     settings = {"h": 0.1, "t1": 1.0, "statistics": [Mean("position")], "keep": "none",
                 "until": lw.Until("mean position[2]", 0.05)}  # fmt: skip

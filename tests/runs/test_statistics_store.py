@@ -36,6 +36,7 @@ def complete(tmp_path_factory):
     return path
 
 
+@pytest.mark.ci
 def test_a_store_without_samples_has_statistics_and_arrays_of_members(complete, memory):
     stored = lw.open_run(complete)
     assert bits(stored) == bits(memory)
@@ -75,6 +76,7 @@ def test_statistics_of_damaged_parts_are_refused(complete, tmp_path):
         lw.open_run(path)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("harm", [hostile.flipped, hostile.torn(0.99), hostile.removed])
 def test_a_damaged_part_is_seen_and_its_block_alone_runs_again(harm, complete, memory, tmp_path):
     path = shutil.copytree(complete, tmp_path / "run.zarr")
@@ -87,6 +89,7 @@ def test_a_damaged_part_is_seen_and_its_block_alone_runs_again(harm, complete, m
     assert [name for name in after if after[name] != before[name]] == ["000000512.json"]
 
 
+@pytest.mark.ci
 def test_samples_and_statistics_together(memory, tmp_path):
     save = lw.SaveAt(every=0.1, fields=("attitude",))
     result = lw.solve(fleet(), **SETTINGS | {"save": save}, statistics=STATISTICS, store=tmp_path / "run.zarr")
@@ -105,6 +108,7 @@ def test_members_kept_are_run_again_and_after_a_resume(complete, tmp_path):
         assert list(one.kept_members) == [3, 1002]
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("executor", [pytest.param("processes", marks=pytest.mark.slow), "threads"])
 def test_executors_give_the_same_bits(executor, memory, complete, tmp_path):
     settings = {**SETTINGS, "statistics": STATISTICS, "keep": "none", "executor": executor, "threads": 2}
@@ -145,6 +149,7 @@ def test_until_stops_a_store_at_the_same_block(stopped, tmp_path):
         lw.open_run(stopped, [memory.members])
 
 
+@pytest.mark.ci
 def test_until_stops_a_resumed_store_at_the_same_block(stopped, tmp_path):
     path = shutil.copytree(stopped, tmp_path / "run.zarr")
     before = tree(path)
@@ -245,6 +250,7 @@ def test_a_run_in_parts_has_no_until(tmp_path):
         lw.solve(fleet(), **SETTINGS, until=UNTIL, store=tmp_path / "run.zarr", blocks=range(1))
 
 
+@pytest.mark.ci
 def test_parts_of_a_run_are_merged_with_their_statistics(complete, memory, tmp_path):
     for i, only in enumerate((range(0, 2), range(2, 4))):
         lw.solve(fleet(), **SETTINGS, statistics=STATISTICS, keep="none", store=tmp_path / f"{i}.zarr", blocks=only)

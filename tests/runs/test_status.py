@@ -59,6 +59,7 @@ def test_the_twin_agrees_on_what_is_solvable(scene):
             solver(J @ [0.0, 1.05, 0.0], J)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("method", METHODS)
 def test_the_twin_stops_where_the_kernel_does(scene, method):
     # On principal axes, where |J^-1 a| < 1 is sharp, the twin's step raises for the members that the kernel freezes.
@@ -121,6 +122,7 @@ def test_non_finite_start(scene, field, bad):
     assert all(np.isfinite(np.delete(getattr(result, name), 4, axis=1)).all() for name in names)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("n", [1, 7, 8, 9, 257])
 def test_ragged_packets(scene, n):
     states = random_states(8, n)

@@ -87,6 +87,7 @@ def test_the_files_of_a_folder_are_told(runs, capsys):
     assert [item["kind"] for item in json.loads(capsys.readouterr().out)["holds"]] == ["result"]
 
 
+@pytest.mark.ci
 def test_pictures_and_a_report(copied):
     folder = copied / "memory"
     assert cli.main(["plot", str(folder)]) == cli.main(["report", str(folder)]) == 0

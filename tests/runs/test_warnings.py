@@ -205,6 +205,7 @@ def test_an_attitude_that_is_no_rotation_is_told_by_default(kept):
     assert lw.solve(fleet, "rk4", h=h, t1=steps * h, checks="none", **kept).warnings.counts() == {}
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("dtype", ["float64", pytest.param("float32", marks=pytest.mark.slow)])
 def test_an_attitude_that_was_no_rotation_on_the_way_is_told(dtype):
     # float32 runs put R back each 128 steps, so that it is a rotation at the end; samples before are none.

@@ -329,6 +329,7 @@ def test_a_number_that_may_not_be_less():
     says(found.messages[0], "drag.quadratic[2]", "from above alone")
 
 
+@pytest.mark.ci
 def test_a_number_that_cannot_be_moved_leaves_the_others():
     scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.1, 0.05]})
     by = ["drag_matrix.linear[5,1]", "vehicle.buoyancy"]
@@ -411,6 +412,7 @@ def test_members_of_a_fleet_with_different_ends():
     assert (found.jacobian[1:, 1, 0] < 0.0).all()
 
 
+@pytest.mark.ci
 def test_noise_is_that_of_the_member():
     """In linear drag the way is linear in the start and in the strength of the noise."""
     gusts = lw.terms.WrenchNoise(force=(0.0, 0.0, 6.0))

@@ -76,6 +76,7 @@ def test_coupled_axes_beside_a_sweep(inertia, delay):
     assert found.values["disk"][0] == pytest.approx(swept(A, B, C, grid), rel=1e-4)
 
 
+@pytest.mark.ci
 def test_a_factor_in_the_disk_is_borne_and_one_beyond_is_not():
     # What the worst disk says of gain alone is within what gain alone bears.
     law = HeadingPID(kp=6.0, ki=0.8, kd=9.0)
@@ -88,6 +89,7 @@ def test_a_factor_in_the_disk_is_borne_and_one_beyond_is_not():
     assert found.to_dict()["eigenvalues"]["disk"] == found.values["disk"].tolist()
 
 
+@pytest.mark.ci
 def test_what_has_no_disk():
     law = HeadingPID(kp=-6.0, kd=9.0)
     found = lw.linear.margins(scene(law, (5.0, 8.0, J)), of=("disk",), about=10.0, settle=20.0, method="psi_s", h=H)

@@ -155,16 +155,19 @@ def test_a_share_that_was_not_seen_is_told():
     assert held >= 14
 
 
+@pytest.mark.ci
 def test_the_effect_of_unseen_members_is_bounded_for_a_probability():
     found = lw.estimate(resting(north=NORMAL(std=1.0)), "position[0] above 1", 0.1, **STILL)
     assert not any("rarer" in message for message in found.messages)
 
 
+@pytest.mark.ci
 def test_a_look_is_small_where_members_cost_much():
     found = lw.estimate(resting(north=NORMAL(std=1.0)), "position[0]", 0.2, t1=100.0, h=0.01, method="rk4", threads=1)
     assert found.recipe["looked"] == 512
 
 
+@pytest.mark.ci
 def test_a_regression_of_few_members_is_not_exact():
     """x + a clip that none of 64 members may show: no error is below the effect of such a part."""
     fleet, of, _, _ = clipped(1e-4)
@@ -173,6 +176,7 @@ def test_a_regression_of_few_members_is_not_exact():
     assert found.sampling_error >= 1.4 / members
 
 
+@pytest.mark.ci
 def test_smooth_answers_keep_their_gain():
     """Plain Monte Carlo takes a million members for a thousandth of the spread, Sobol points or regression a hundredth."""
     fleet = resting(north=NORMAL(std=1.0), east=NORMAL(std=1.0))
@@ -182,6 +186,7 @@ def test_smooth_answers_keep_their_gain():
     assert found.sampling_error <= 1.5e-3
 
 
+@pytest.mark.ci
 def test_a_heavy_tail_is_told_where_it_is_asked_for():
     fleet = resting(north=NORMAL(std=1.0))
 
@@ -296,6 +301,7 @@ def test_recipes_of_every_kind_give_the_same_bits(of):
     assert again.members == found.members
 
 
+@pytest.mark.ci
 def test_what_is_no_recipe_is_refused():
     fleet = resting(north=NORMAL(std=1.0))
     found = lw.estimate(fleet, "position[0]", 0.2, **STILL)
@@ -312,6 +318,7 @@ def test_what_is_no_recipe_is_refused():
         says(refused(lw.estimate, fleet, "position[0]", recipe=odd), "recipe", "is not a recipe of an answer")
 
 
+@pytest.mark.ci
 def test_the_time_of_plain_members_is_of_whole_members():
     """An error far above the spread takes plain Monte Carlo its least number of members, not a part of one."""
     found = lw.estimate(resting(north=NORMAL(std=1.0)), "position[0]", 1e4, **STILL)

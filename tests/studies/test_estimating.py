@@ -187,6 +187,7 @@ def test_members_that_two_steps_leave_apart():
     assert not found.estimator.startswith("levels")
 
 
+@pytest.mark.ci
 def test_the_page(tmp_path, monkeypatch):
     """The snippets of docs/guide/least_cost.md."""
     known = {}

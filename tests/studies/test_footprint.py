@@ -41,6 +41,7 @@ def test_a_run_in_a_store_has_the_same_footprint(result, tmp_path, monkeypatch):
     np.testing.assert_allclose(lw.studies.footprint(part).centre, result.position[-1, [5, 3, 200], :2].mean(axis=0))
 
 
+@pytest.mark.ci
 def test_members_that_were_kept_are_a_result_of_their_own():
     few = lw.solve(FLEET, keep=[1, 2, 3], **RUN)
     says(refused(lw.studies.footprint, few), "were not kept", "keep='all'", "result.kept")

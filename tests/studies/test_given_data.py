@@ -30,6 +30,7 @@ def result(fleet):
     return lw.solve(fleet, **SETTINGS)
 
 
+@pytest.mark.ci
 def test_shares_are_those_of_the_closed_form(result):
     """A bin of 31 leaves a 31st squared of an input's variance within it, and so does chance: 0.02 is five of its errors."""
     found = lw.uq.given_data(result, ["depth", "outcome floor", "depth at 0.5"])
@@ -60,6 +61,7 @@ def test_a_store_and_a_file_give_the_same(fleet, result, tmp_path):
     np.testing.assert_array_equal(again.slope, wanted.slope)
 
 
+@pytest.mark.ci
 def test_what_has_no_indices_is_said(result):
     still = lw.solve(lw.Ensemble(fleet_of(2).scene, 8), **SETTINGS)
     with pytest.raises(lw.SceneError, match="no number that differs between members"):
@@ -74,6 +76,7 @@ def test_what_has_no_indices_is_said(result):
     assert lw.uq.given_data(bare, "outcome floor").first.shape == (1, 3)
 
 
+@pytest.mark.ci
 def test_correlated_inputs_are_named():
     both = lw.distributions.CorrelatedNormal(std=[0.3, 0.2], correlation=[[1.0, 0.8], [0.8, 1.0]])
     fleet = lw.Ensemble(fleet_of(2).scene, 500, 3, {"start.position[2], start.velocity[2]": both})

@@ -144,6 +144,7 @@ def test_sensitivity_and_derivatives(case, line):
     assert f" {case.of_unit} " in text
 
 
+@pytest.mark.ci
 def test_a_worst_case_and_the_best_number(case, line):
     low, high = case.mean - 0.1, case.mean + 0.1
     best, worst = (low, high) if case.slope > 0.0 else (high, low)

@@ -59,6 +59,7 @@ def test_a_trim_balances_the_forces_of_the_equations():
     assert "speed 1.5 m/s" in str(found)
 
 
+@pytest.mark.ci
 def test_a_run_from_a_trim_stays_there():
     found = lw.linear.trim(hover(), 1.0, free=("control_wrench",), fixed={"pitch": 0.1}, method="psi_s", h=0.02)
     assert found.free == tuple(f"control_wrench[{i}]" for i in range(6))
@@ -74,6 +75,7 @@ def test_a_run_from_a_trim_stays_there():
     np.testing.assert_allclose(after.position[0], 10.0 * found.start.attitude @ found.start.velocity, atol=100.0 * most)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(("words", "message"), [
     ({"speed": 1.0, "free": ("pitch",)}, "has no steady motion with pitch free"),
     ({"speed": 1.0, "free": ("pich",)}, "Did you mean 'pitch'"),

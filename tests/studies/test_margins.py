@@ -97,6 +97,7 @@ def by_hand(fleet, least):
     return dict(zip(("gain_lower", "gain_upper", "delay"), np.array(rows).T, strict=True))
 
 
+@pytest.mark.ci
 def test_margins_by_eigenvalues_are_those_of_the_system_by_hand(fleet, found):
     expected = by_hand(fleet, 1.0)
     assert found.steady.all()
@@ -144,6 +145,7 @@ def test_a_distribution(found):
     says(str(found), "gain_upper", "delay s")
 
 
+@pytest.mark.ci
 def test_a_loop_that_does_not_settle_has_no_margins():
     loops = lw.Ensemble.from_states(
         scene(delay=0.06), np.zeros((2, 3)), np.tile(np.eye(3), (2, 1, 1)), np.zeros((2, 3)), np.zeros((2, 3)),
@@ -207,6 +209,7 @@ def test_what_is_no_scene():
             ask("scene.toml", **words)
 
 
+@pytest.mark.ci
 def test_a_copy_that_fails_does_not_settle(fleet):
     """Beside a motion at the edge of what a step can solve, one of two copies is beyond it."""
     members = study.Study(fleet, None, 80.0, 80.0, 10.0, 1e-3, "psi_s", H)

@@ -51,6 +51,7 @@ def test_the_worst_case_of_the_ensemble_is_the_largest_peak(answer):
     ]
 
 
+@pytest.mark.ci
 def test_of_one_component_the_peak_of_s_is_one_over_the_disk_of_skew_one(answer):
     fleet, peaks = answer
     disk = lw.linear.margins(fleet, "heading_pid", skew=1.0, **SETTINGS | {"of": ("disk",)}).values["disk"]

@@ -134,6 +134,7 @@ def test_loops_without_a_crossover_bear_any_phase_and_several_crossovers_have_a_
     assert one[1] < np.pi
 
 
+@pytest.mark.ci
 def test_a_loop_that_grows_has_an_open_loop_and_no_margins():
     """At its set-point exactly nothing moves: the motion is steady, and one tilt shows that it does not settle."""
     law = HeadingPID(kp=6.0, kd=2.1 * J / PERIOD)
@@ -162,6 +163,7 @@ def by_hand(A, B, C, w):
     return np.array([-C @ np.linalg.solve(z * np.eye(len(A)) - A, B) for z in np.exp(1j * PERIOD * w)])
 
 
+@pytest.mark.ci
 def test_open_loops_beside_those_by_hand(loops):
     fleet, each = loops
     w = np.geomspace(0.05, np.pi / PERIOD, 30)

@@ -67,6 +67,7 @@ def test_the_probability_of_a_place_is_that_of_a_normal(answer):
     assert answer.distance == pytest.approx(-ndtri(1e-5), rel=0.03)
 
 
+@pytest.mark.ci
 def test_failing_members_fail_again(answer):
     again = lw.solve(lw.Ensemble(scene_of(), sampling=answer.failing), **RUN)
     assert again.members == len(answer.weights) > 300
@@ -103,6 +104,7 @@ def test_the_answer_is_kept_in_files(answer, tmp_path):
     assert lw.Ensemble(scene_of(), sampling=table).members == len(answer.weights)
 
 
+@pytest.mark.ci
 def test_the_same_seed_has_the_same_answer(answer):
     again = lw.rare_event(fleet_of(), f"position[0] - {bound_of(1e-5):.12g}", **RUN)
     assert again.probability == answer.probability
@@ -245,6 +247,7 @@ def test_chains_at_a_cheaper_setting(answer):
     assert cheap.members["the scene's own"] < 0.5 * answer.members["the scene's own"]
 
 
+@pytest.mark.ci
 def test_a_cheaper_scene_that_tells_nothing_is_left_out(answer):
     limit = f"position[0] - {bound_of(1e-5):.12g}"
     # Ten times the drag: where members end is where they began.
@@ -253,6 +256,7 @@ def test_a_cheaper_scene_that_tells_nothing_is_left_out(answer):
     assert told.probability == answer.probability
 
 
+@pytest.mark.ci
 def test_members_that_fail_are_the_event_and_told_apart():
     def lost(result):
         north = result.samples["position"][-1, :, 0]
@@ -314,6 +318,7 @@ def test_more_draws_than_memory_holds_are_refused_before_anything_runs():
         lw.rare_event(scene_of(NOISE), "position[0] - 99.0", **settings)
 
 
+@pytest.mark.ci
 def test_what_is_likely_is_sampled():
     found = lw.rare_event(fleet_of(), f"position[0] - {bound_of(0.02):.12g}", **RUN)
     assert found.estimator == "plain"
@@ -350,6 +355,7 @@ def test_noise_alone_can_be_the_cause():
     assert "the scene and its noise" in str(found)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("limit, words", [
     ("floor", "neither a quantity nor an event of the scene"),
     ("outcome floor", "is there or not"),

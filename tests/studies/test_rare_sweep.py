@@ -177,6 +177,7 @@ def test_files_of_rare_failures_are_found_again(scene, folder, answer, tmp_path)
     assert (tmp_path / "rare.png").stat().st_size > 5_000
 
 
+@pytest.mark.ci
 def test_absent_nothing_is_told(scene):
     plain = swept(scene, cases=[{"name": "near"}, {"name": "aside", "replace": ASIDE, "rare": False}], rare=None)
     assert plain.rares is None

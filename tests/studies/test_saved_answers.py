@@ -45,6 +45,7 @@ def estimated():
 MADE = {"tune_gains": tuned, "trim": steady, "assimilate": assimilated, "estimate": estimated}
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("name", MADE)
 def test_an_answer_is_saved_read_and_reported(name, tmp_path):
     found = MADE[name]()
@@ -68,6 +69,7 @@ def test_an_answer_is_saved_read_and_reported(name, tmp_path):
         says(page, "recipe", "estimator", str(found.recipe["seed"]))
 
 
+@pytest.mark.ci
 def test_a_run_goes_on_from_an_assimilation_that_was_read(tmp_path):
     """The end is kept to the bit, with what actuators and controllers remember."""
     found = assimilated()
@@ -88,6 +90,7 @@ def test_infinite_costs_are_read_back(tmp_path):
     np.testing.assert_equal(dataclasses.astuple(again), dataclasses.astuple(without))
 
 
+@pytest.mark.ci
 def test_a_damaged_array_is_refused(tmp_path):
     found = assimilated()
     (file, *_) = found.save(tmp_path)

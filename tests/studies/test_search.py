@@ -75,6 +75,7 @@ def test_a_known_worst_corner():
     assert "an upper bound of the smallest" in str(least)
 
 
+@pytest.mark.ci
 def test_a_failure_is_the_worst_case():
     # Beyond h |Omega| = 2 the step of psi_s has no solution.
     found = lw.worst_case(regulated(), {"start.angular_velocity[2]": (0.0, 40.0)}, "norm(position)", budget=600, **RUN)
@@ -127,6 +128,7 @@ def test_tuned_gains_are_those_of_the_regulator(regulator, risk):  # noqa: F811
     assert str(risk) in str(found)
 
 
+@pytest.mark.ci
 def test_what_is_told_of_fresh_members():
     fleet = lw.Ensemble(regulated(), 4, 3, STARTS)
     found = lw.tune_gains(fleet, OVER, costs, risk=0.75, budget=4 * 16, fresh=8, save=SAVE, **RUN)
@@ -150,6 +152,7 @@ def test_what_cannot_be_tuned():
             lw.tune_gains(fleet, **{"over": OVER, "minimise": "depth", **words}, **RUN)
 
 
+@pytest.mark.ci
 def test_a_course_is_searched_among_starts():
     """A neutral body moves on along its axis: the farthest west is due west, and the members' own spread adds its mean."""
     vary = {"start.position[1]": lw.distributions.Normal(std=1.0)}

@@ -44,6 +44,7 @@ def answer(scene):
     return uq.sobol(scene, [ishigami, "position[1]"], samples=2048, vary=BOX, seed=3, **RUN)
 
 
+@pytest.mark.ci
 def test_what_a_scene_keeps_of_its_own_runs_is_no_matter(scene, answer):
     own = {"keep": "none", "statistics": [{"type": "mean", "of": "depth"}],
            "until": {"statistic": "mean depth", "half_width": 1e9}}  # fmt: skip
@@ -94,6 +95,7 @@ def sobols_g(result):
     return np.prod((np.abs(4.0 * x - 2.0) + WEIGHTS) / (1.0 + WEIGHTS), axis=1)
 
 
+@pytest.mark.ci
 def test_indices_of_sobols_g(scene):
     found = uq.sobol(scene, sobols_g, samples=2048, vary=UNIT, seed=5, second_order=False, **RUN)
     assert found.factors == tuple(UNIT)
@@ -149,6 +151,7 @@ def depth(mass, buoyancy, speed):
     return speed * T1 + 0.5 * T1**2 * (mass * 9.8 - buoyancy) / (mass + 75.0)
 
 
+@pytest.mark.ci
 def test_parts_of_the_variance_of_a_sinking_vehicle(sinking):
     found = uq.sobol(sinking, "position[2]", samples=2048, vary=LAWS, second_order=False, **SINK)
     assert found.second is None
@@ -165,6 +168,7 @@ def test_parts_of_the_variance_of_a_sinking_vehicle(sinking):
     assert abs(found.std[0] / np.sqrt(parts.sum()) - 1.0) < 0.02
 
 
+@pytest.mark.ci
 def test_an_adaptor_gives_the_numbers_themselves(sinking):
     f = uq.model(sinking, LAWS, "position[2]", **SINK)
     assert f.names == tuple(LAWS) == ("vehicle.mass", "vehicle.buoyancy", "start.velocity[2]")
@@ -179,6 +183,7 @@ def test_an_adaptor_gives_the_numbers_themselves(sinking):
     np.testing.assert_array_equal(two(X)[:, 0], f(X))
 
 
+@pytest.mark.ci
 def test_the_adaptor_serves_scipy_and_salib(sinking):
     from SALib.analyze import sobol as analyze
     from SALib.sample import sobol as sample
@@ -285,6 +290,7 @@ def test_members_that_are_added_leave_the_others_bits(sinking, sampling):
 FAST = {"start.angular_velocity[2]": Uniform(low=0.0, high=210.0), "vehicle.buoyancy": Normal(std=1.0)}
 
 
+@pytest.mark.ci
 def test_members_that_fail_are_counted_and_refused(scene):
     message = refused(uq.sobol, scene, "position[2]", samples=64, vary=FAST, **RUN)
     says(message, "of 384 members failed (step_too_large", 'failed="drop"')
@@ -294,6 +300,7 @@ def test_members_that_fail_are_counted_and_refused(scene):
                   **RUN)  # fmt: skip
 
 
+@pytest.mark.ci
 def test_whole_groups_are_used_alone(scene):
     found = uq.sobol(scene, "position[2]", samples=64, vary=FAST, failed="drop", **RUN)
     assert 30 < found.samples < 64
@@ -379,6 +386,7 @@ def test_quantities_of_a_path(scene):
         np.testing.assert_array_equal(np.concatenate(alone, axis=1), whole.values(result))
 
 
+@pytest.mark.ci
 def test_a_quantity_of_the_users_sees_what_members_start_from(sinking):
     fallen = lw.statistics.Quantity(
         "fallen",

@@ -176,6 +176,7 @@ def end_case(p, **more):
 
 
 # Looks are coarse on purpose: in a sixth of the time of the motion a speed changes by half of its spread.
+@pytest.mark.ci
 def test_runs_with_fixed_levels_have_the_right_mean():
     check_mean(shares_of(end_case(1e-3, of=0, start=0.4), range(6), 100, 64), 1e-3)
 
@@ -199,6 +200,7 @@ def test_runs_with_fixed_levels_have_the_right_mean_of_a_largest_speed(bound, vi
     check_mean(shares_of(lambda seed: LinearWalk(seed, bound, 1, True, per=per, looks=views), range(10), 200, 64), p)
 
 
+@pytest.mark.ci
 def test_the_grid_of_densities_knows_reflection():
     # Many steps of a motion without drag: P(max > b) is twice P(end > b), with the bound moved by 0.5826 of a step's spread.
     steps, noise = 100, 0.1
@@ -213,6 +215,7 @@ def chances_of_two(seed, bounds, error):
 
 
 # Both are as probable as that one of them happens after the other: who goes no further than the first sees half of that.
+@pytest.mark.ci
 @pytest.mark.parametrize("bounds, seeds, least", [
     pytest.param((1.3, 1.5), range(3), 3, id="likely"),
     pytest.param((2.2, 2.4), range(20), 18, id="rare", marks=pytest.mark.slow),
@@ -356,6 +359,7 @@ def test_a_failing_path_is_run_again(answer):
         assert end.position[0, 0] > place_of(1e-5, NORTH)
 
 
+@pytest.mark.ci
 def test_the_answer_is_kept_in_files(answer, tmp_path):
     answer.save(tmp_path)
     again = lw.studies.RareEvent.load(tmp_path / "rare.json")
@@ -389,6 +393,7 @@ def test_the_same_seed_has_the_same_answer():
     assert "splitting gains nothing here" in str(first)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("limit, at_once", [
     ("position[0] - 1.0", "position[0]"),
     ("max(position[0]) - 1.0", "max(position[0])"),
@@ -437,6 +442,7 @@ def test_copies_have_noise_of_their_own():
     np.testing.assert_array_equal(there.place.parameters["vehicle.mass"], copies.place.parameters["vehicle.mass"])
 
 
+@pytest.mark.ci
 def test_ends_that_are_joined_go_on_as_they_were():
     run = lw.prepare(both(), levels=True, **RUN | {"t1": H, "save": lw.SaveAt(every=H, final=True)})
     first = run(np.linspace(0.1, 0.9, 7)[:, None], seed=3).final
@@ -530,6 +536,7 @@ def test_two_sides():
     assert found.probability > 5e-4
 
 
+@pytest.mark.ci
 @pytest.mark.slow_for("*reached by none of some")
 @pytest.mark.parametrize("limit, words", [
     ("position[0] - 1000.0", "was reached by none of some"),

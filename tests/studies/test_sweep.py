@@ -90,6 +90,7 @@ def test_a_case_that_is_refused_is_noted_and_the_others_go_on(found):
         found.success("unknown", {"controller.delay": 0.02})
 
 
+@pytest.mark.ci
 def test_members_are_the_same_in_all_cells_bit_by_bit(found, scene):
     cells = [cell for cell in found.cells if not found.record(cell).refused]
     inputs = [found.inputs(cell) for cell in cells]
@@ -151,6 +152,7 @@ def test_the_worst_corner_is_the_one_known(found):
     assert worst[0]["start.position[0]"] == x[np.argmax(np.abs(x))]
 
 
+@pytest.mark.ci
 def test_the_worst_again_alone_have_their_bits(found, scene):
     at = {"controller.delay": 0.04}
     rows = found.worst(5, by="rms heading", case="stiff")
@@ -226,6 +228,7 @@ def test_a_sweep_that_was_stopped_goes_on_with_the_same_bytes(scene, tmp_path, f
         "soft", "rms heading", {"controller.delay": 0.02}).tobytes()  # fmt: skip
 
 
+@pytest.mark.ci
 def test_a_metric_of_what_a_case_does_not_want_refuses_the_case(scene):
     level = {"guidance": [{"type": "set_point", "depth": 0.0, "heading": 1.0}]}
     mixed = swept(scene, grid=None, members=4, cases=[{"name": "place"}, {"name": "level", "replace": level}])
@@ -236,6 +239,7 @@ def test_a_metric_of_what_a_case_does_not_want_refuses_the_case(scene):
         lw.worst_case(mixed.cells[1].fleet, {"vehicle.mass": (45.0, 55.0)}, "iae north", budget=64)
 
 
+@pytest.mark.ci
 def test_members_that_fail_do_not_pass_and_come_first(scene):
     bad = swept(scene, grid=None, cases=None, vary={**VARY, "start.velocity[0]": Choice([0.0, 1e307], [0.9, 0.1])})
     record = bad.record(bad.cells[0])

@@ -28,6 +28,7 @@ def bars_of(axes):
     return np.array(rows)
 
 
+@pytest.mark.ci
 def test_success_over_one_axis_has_a_line_for_each_case(found, tmp_path):  # noqa: F811
     (axes,) = sweeps.plot_success(found, tmp_path / "success.png")
     assert (tmp_path / "success.png").stat().st_size > 10_000
@@ -39,6 +40,7 @@ def test_success_over_one_axis_has_a_line_for_each_case(found, tmp_path):  # noq
     assert "95% interval" in axes.get_ylabel()
 
 
+@pytest.mark.ci
 def test_success_of_cases_alone(plain):
     (axes,) = sweeps.plot_success(plain)
     assert [label.get_text() for label in axes.get_xticklabels()] == ["soft", "stiff"]
@@ -46,6 +48,7 @@ def test_success_of_cases_alone(plain):
     np.testing.assert_allclose(bars_of(axes), expected, atol=1e-9)
 
 
+@pytest.mark.ci
 def test_success_over_two_axes_is_a_map_with_intervals(scene):  # noqa: F811
     grid = {"controller.delay": [0.02, 0.04], "heading_pid.kd": [3.0, 4.0], "heading_pid.ki": [0.0]}
     wide = swept(scene, grid=grid, members=20)
@@ -108,6 +111,7 @@ def test_causes_are_those_of_the_worst_cell(found):  # noqa: F811
         assert line.get_label().endswith(f": {chosen.sum():,}")
 
 
+@pytest.mark.ci
 def test_responses_are_fans_of_members_run_again(plain):
     panels = sweeps.plot_responses(plain, of="position", members=5)
     assert [axes.get_title() for axes in panels] == ["100 % pass: soft", "100 % pass: stiff"]

@@ -38,6 +38,7 @@ def output(tmp_path_factory):
     return fixed_pictures.reports(tmp_path_factory.mktemp("reports"))
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("name", KNOWN["reports"])
 def test_a_report_says_what_it_said(name, output):
     check(KNOWN["reports"][name], output[name])

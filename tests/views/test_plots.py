@@ -157,6 +157,7 @@ def test_nothing_is_cut_off(drawn, name):
     assert box.y1 <= height + 0.01
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("name", NAMES)
 def test_text_can_be_read_at_700_pixels(drawn, name):
     figure = drawn[name]
@@ -283,6 +284,7 @@ def test_a_histogram_counts_every_member_once(solved, drawn):
     assert sum(bar.get_width() for bar in lw.plots.histogram(same).patches) == pytest.approx(100.0)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("ending_of_name", ["svg", "pdf", "png"])
 def test_files_and_axes(solved, tmp_path, ending_of_name):
     figure = Figure()

@@ -37,6 +37,7 @@ def test_words_stand_beside_data_of_runs(name):
     assert unread_of(RUNS[name]()) == {}
 
 
+@pytest.mark.ci
 def test_words_of_statistics_stand_beside_data(solved):  # noqa: F811
     assert unread(lw.plots.statistics(solved)[0].figure) == []
 

@@ -44,6 +44,7 @@ def run(fleet, method="rk4", h=0.05, t1=2.4, **named):
     return lw.solve(fleet, method, h=h, t1=t1, **named)
 
 
+@pytest.mark.ci
 def test_recoil():
     # The center of all mass rests: the vehicle goes back by m dr / M, and at m v / M while the mass is on its way.
     mass = lw.terms.MovingMass(mass=2.0, times=[1.0, 2.0], places=[[0.0, 0.0, 0.0], [0.3, 0.0, 0.0]])
@@ -55,6 +56,7 @@ def test_recoil():
     )
 
 
+@pytest.mark.ci
 def test_a_move_within_one_step_recoils_as_far():
     # No step meets the knots: that which has them takes the mean velocity.
     mass = lw.terms.MovingMass(mass=2.0, times=[1.013, 1.028], places=[[0.0, 0.0, 0.0], [0.3, 0.0, 0.0]])
@@ -86,6 +88,7 @@ def place(path, t):
     return r, (places[i] - places[i - 1]) / (times[i] - times[i - 1]) if inside else np.zeros(3)
 
 
+@pytest.mark.ci
 def test_momenta_of_two_bodies():
     # A shell and a point mass, each by itself: their momenta about the inertial origin are those of the start.
     path = dict(mass=3.0, times=[0.4, 1.2, 2.0], places=[[0.1, 0.0, 0.05], [0.3, -0.2, 0.0], [-0.2, 0.1, 0.2]])
@@ -321,6 +324,7 @@ def test_automatic_choice():
     assert damped(lw.terms.MovingMass(**PATH)).with_numbers({"moving_mass.mass": 1.0}).terms[1].carried is False
 
 
+@pytest.mark.ci
 def test_momenta_and_energy_of_results(tmp_path):
     # In a vacuum momenta stay; the energy of a spinning pair is that of two bodies, by hand.
     path = dict(mass=3.0, times=[0.4, 1.2, 2.0], places=[[0.1, 0.0, 0.05], [0.3, -0.2, 0.0], [-0.2, 0.1, 0.2]])
@@ -347,6 +351,7 @@ def test_energy_of_its_weight():
         assert energies[0] - energies[1] == pytest.approx(-BATTERY * GRAVITY * 0.1, rel=1e-13)
 
 
+@pytest.mark.ci
 def test_a_method_is_chosen():
     result = lw.solve(alone(lw.terms.MovingMass(**PATH | {"mass": 2.0})), h=0.05, t1=0.1)
     assert "rk4" in str(result.provenance["method"])

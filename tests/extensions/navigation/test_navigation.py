@@ -292,6 +292,7 @@ def test_the_allan_deviation_is_as_set(which):
         assert abs(allan(rates, m) / allan_of(noise, walk, m) - 1.0) < 4.0 * np.sqrt(2.0 / windows)
 
 
+@pytest.mark.ci
 def test_the_twins_errors_are_as_large_as_it_believes():
     truth, listed, members = voyage(120), parts(attitude_sigma=0.005, velocity_sigma=0.02), 8
     belief = np.stack([run_twins(listed, truth, member)[1] for member in range(members)], axis=1)
@@ -485,6 +486,7 @@ def test_bands_are_those_of_chi_square(voyages):
         lw.metrics.consistency(voyages, level=95)
 
 
+@pytest.mark.ci
 def test_what_a_filter_believes_is_a_quantity_of_statistics(voyages):
     ensemble = lw.Ensemble(remus(parts(("depth",), **ON_BOARD)), 200, seed=1)
     run = lw.solve(ensemble, t1=2.0, save=lw.SaveAt(every=0.5, fields=("nees",)), **SETTINGS,
@@ -493,6 +495,7 @@ def test_what_a_filter_believes_is_a_quantity_of_statistics(voyages):
     assert abs(run.statistics["mean nees"].value[-1, 0] - voyages.nees[4].mean()) < 1e-9
 
 
+@pytest.mark.ci
 def test_nees_and_nis_are_metrics_of_members(voyages):
     asked = [lw.metrics.NEES(then=[lw.statistics.MemberValues()]), lw.metrics.NIS(then=[lw.statistics.MemberValues()])]
     ensemble = lw.Ensemble(remus(parts(("depth",), **ON_BOARD)), 200, seed=1)
@@ -509,6 +512,7 @@ def test_nees_and_nis_are_metrics_of_members(voyages):
         lw.metrics.NIS("depth")
 
 
+@pytest.mark.ci
 def test_a_filter_goes_on_where_a_run_ended(voyages):
     first = sailed(200, 10.0, 0.5)
     on = lw.solve(lw.Ensemble(remus(parts(("depth",), **ON_BOARD)), 200, seed=1), start=first.final, t1=20.0,

@@ -435,6 +435,7 @@ def test_a_file_that_becomes_another_while_it_is_looked_at(tmp_path, monkeypatch
     np.testing.assert_array_equal(read(tmp_path / "a.nc", ROMS, **ROMS_BOX).velocities, expected)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     "text",
     [

@@ -200,6 +200,7 @@ def test_members_that_an_event_stops_are_told():
     assert 5 < below <= int(re.search(r"stopped (\d+) of 60 members", message)[1]) < 40
 
 
+@pytest.mark.ci
 def test_an_attitude_is_learned_from_headings():
     # Turns about the vertical add: the headings are a scalar that Kalman's filter knows.
     vary = {"start.attitude": lw.distributions.RotationNormal(std=[0.0, 0.0, 0.3])}

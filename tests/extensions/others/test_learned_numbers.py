@@ -206,6 +206,7 @@ def test_members_given_as_arrays():
     np.testing.assert_array_equal(coordinates.at[0], c)
 
 
+@pytest.mark.ci
 def test_separate_values_are_left_to_particles():
     fleet, y = slowing(300, 0, D.Choice([3.0, 5.0, 8.0])), measured(2)
     message = f"learn = {NAME}: one of them has separate values"
@@ -219,6 +220,7 @@ def test_separate_values_are_left_to_particles():
     assert set(answer.parameters[NAME]) <= {3.0, 5.0, 8.0}
 
 
+@pytest.mark.ci
 def test_the_filter_is_named_where_it_leaves_what_the_scene_takes():
     fleet = slowing(50, 0, D.Normal(std=8.0, mean=40.0))
     with pytest.raises(lw.SceneError, match=r"learn: at \d+ s the filter moved .*LogNormal\(sigma=\.\.\.\)"):
@@ -394,6 +396,7 @@ def test_bands_of_innovations():
     assert innovations.tested(gaps, gaps, 0, 0.95).count == np.isfinite(gaps).sum()
 
 
+@pytest.mark.ci
 def test_copies_of_a_particle_count_once():
     fleet, y = slowing(100), measured(0)
     fixes = lw.studies.Series("position[0]", FIXES, y, 0.05)
@@ -413,6 +416,7 @@ def test_copies_of_a_particle_count_once():
     assert alone.effective[-1] == pytest.approx(1.0)
 
 
+@pytest.mark.ci
 def test_weights_of_a_table_are_those_of_particles():
     # 3 and 5 kg/s, of which the first is nine times as probable before.
     fleet = slowing(2)

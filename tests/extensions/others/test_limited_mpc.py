@@ -224,6 +224,7 @@ def test_a_jump_of_the_reference_is_no_disturbance(lower):
     assert begun.position[-1, 0, 2] > 7.5
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("cost", [1e3, 1e7, 1e9])
 @pytest.mark.kernel
 def test_a_limit_that_is_broken_at_the_start_is_met_again_whatever_it_costs(cost):
@@ -239,6 +240,7 @@ def test_a_limit_that_is_broken_at_the_start_is_met_again_whatever_it_costs(cost
     assert result.samples["unconverged"][-1, 0] == 0.0 or cost > 1e6
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_an_output_that_inputs_hardly_move_converges():
     """By what round-off leaves of a linear model: the output is exceeded, whatever the inputs do, and they ignore it."""

@@ -162,6 +162,7 @@ def test_a_member_that_ends_at_a_sample_is_written_once(at, off, extra, result, 
     assert len(frames) == sum(topic.endswith("/odometry") for topic, *_ in found)
 
 
+@pytest.mark.ci
 def test_a_track_across_the_antimeridian_is_cut(tmp_path):
     of = lw.Scene.named("remus_100", environment={"origin": [10.0, 179.99996]},
                         start={"velocity": [1.5, 0.0, 0.0], "euler_deg": [0.0, 0.0, 90.0]})  # fmt: skip

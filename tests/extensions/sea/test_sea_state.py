@@ -35,6 +35,7 @@ def jonswap(f, gamma, tp=TP):
     return f**-5.0 * np.exp(-1.25 * (f * tp) ** -4.0) * gamma ** np.exp(-((f * tp - 1.0) ** 2) / (2.0 * sigma**2))
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("amplitudes", ["equal", "rayleigh"])
 def test_significant_height_of_the_surface(amplitudes):
     # One sample of each of 1e5 seas. Of n independent waves <eta^4> = 3 m0^2 (1 - 1 / 2n); of Rayleigh's eta is normal.

@@ -74,6 +74,7 @@ def test_a_floor_above_the_surface_leaves_no_waves():
         lw.solve(scene, "psi_s", h=0.1, t1=1.0)
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_heights_above_the_tide_of_each_member():
     # Free bodies that rise by 1 m: from 2 m under their surfaces, and from 0.5 m under them.

@@ -37,6 +37,7 @@ def again(final, arrays=None, **numbers):
     return type(final).from_arrays(own | (arrays or {}), known | numbers, parameters)
 
 
+@pytest.mark.ci
 def test_an_end_from_arrays_goes_on_to_the_bit(fleet, result):
     one = lw.solve(fleet, "psi_s", **ARGUMENTS, start=again(result.final))
     np.testing.assert_array_equal(one.position[-1], lw.solve(fleet, "psi_s", **ARGUMENTS).position[-1])
@@ -86,6 +87,7 @@ def test_parameters_that_no_members_have_are_refused(value, result):
     assert str(told.value).count("final.") == 1
 
 
+@pytest.mark.ci
 def test_parameters_of_another_shape_are_others(fleet, result):
     """A run of another scene goes on with its own numbers; one that takes the end's refuses them."""
     arrays, numbers, parameters = parts_of(result.final)
@@ -182,6 +184,7 @@ def test_members_that_failed_and_drifted_attitudes_are_taken(fleet, result, tmp_
         lw.Result.load(other.save(tmp_path / "run.npz")).final.checked()
 
 
+@pytest.mark.ci
 def test_members_in_another_order_are_told(fleet, result):
     told = [text for text in lw.solve(fleet, "psi_s", **ARGUMENTS, start=result.final).messages if "start is" in text]
     assert told == []

@@ -107,6 +107,7 @@ def takers(tmp_path_factory):
 SETS = {"keep", "export", "recording"}
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 @pytest.mark.parametrize("name", ["ensemble", "section", "result", "final", "of a store", "open_run", *sorted(SETS)])
 def test_every_taker_takes_the_same_members(name, takers):

@@ -149,6 +149,7 @@ def test_inertia_and_added_mass_are_given_by_name():
         lw.Vehicle(20.0, (1.5, 4.0, 4.5), (5.0, 22.0, 25.0))
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_a_store_that_is_being_written_is_told_so(tmp_path):
     fleet = lw.Ensemble(lw.Scene(lw.Vehicle(**odd_calls.BODY)), 600)

@@ -84,6 +84,7 @@ def functions_of(built):
     }  # fmt: skip
 
 
+@pytest.mark.ci
 def test_some_odd_calls_of_methods_end_in_refusals(built):
     calls = calls_of(built)
     some = np.random.default_rng(3).choice(len(calls), 800, replace=False)

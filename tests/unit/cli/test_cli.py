@@ -29,6 +29,7 @@ def finished(tmp_path_factory):
     return out, subprocess.run(arguments, capture_output=True, text=True, cwd=out.parent)
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_run_writes_three_files_and_a_summary(finished):
     out, done = finished

@@ -267,6 +267,7 @@ def test_files_that_were_written_and_why_not(tmp_path):
     assert written.files[-1] == tmp_path / "i"
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_what_rare_and_derivatives_wrote_is_shown_and_drawn(tmp_path, capsys):
     vary = {"start.velocity": lw.distributions.Normal(std=[0.0, 0.0, 0.1])}

@@ -201,6 +201,7 @@ CASES = [
 ]  # fmt: skip
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(("verb", "options", "expected"), CASES)
 def test_options_reach_the_function(verb, options, expected, tmp_path, capsys):
     """An absent option is not passed on: the function's own default holds."""

@@ -396,6 +396,7 @@ def test_documents_of_stores(tmp_path, capsys):
     )
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 @pytest.mark.skipif(os.name == "nt", reason="there are no pseudo-terminals")
 def test_a_run_on_a_terminal(tmp_path):
@@ -474,6 +475,7 @@ def test_a_study_is_read_back_from_its_file(make, tmp_path):
         assert again.front() == found.front()
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("verb", STUDIES)
 def test_studies_print_a_document_and_info_and_plot_know_their_folders(verb, tmp_path, capsys):
     make = STUDIES[verb]

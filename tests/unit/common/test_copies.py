@@ -78,6 +78,7 @@ def failing(name):
     raise ERRORS[name]()
 
 
+@pytest.mark.ci
 def test_a_worker_of_a_pool_raises_them():
     """A pool that cannot read an error waits for ever. (Interrupted, as KeyboardInterrupt, ends the worker itself.)"""
     with multiprocessing.get_context("spawn").Pool(1) as pool:
@@ -257,6 +258,7 @@ def ran():
     return made
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 @pytest.mark.parametrize("way", WAYS)
 def test_what_runs_give(ran, way):
@@ -328,6 +330,7 @@ def all_fail():
     return lw.solve(fleet, "psi_s", h=0.1, t1=0.5, on_failure="raise")
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_a_pool_hears_of_members_that_failed():
     pool = concurrent.futures.ProcessPoolExecutor(1, multiprocessing.get_context("spawn"))

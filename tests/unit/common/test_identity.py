@@ -234,6 +234,7 @@ def other(x): return law(on_device(x)), Law, np.linalg.norm
 """
 
 
+@pytest.mark.ci
 def test_it_is_the_same_in_every_process(tmp_path):
     """Hashes of texts, and so the order of sets, and places in memory differ between processes."""
     (tmp_path / "laws_in_a_file.py").write_text(LAWS)

@@ -151,6 +151,7 @@ def test_the_thumbnail_says_of_how_many_and_is_left_out_where_there_are_no_paths
     assert result(times=1).summary_picture() == ""
 
 
+@pytest.mark.ci
 def test_a_notebook_loads_no_library_of_pictures():
     code = "import tests.unit.common.test_summaries as t, sys; [x._repr_html_() for x in t.OBJECTS.values()]; " \
            "print(sorted({'matplotlib', 'rerun', 'IPython', 'tqdm'} & set(sys.modules)))"  # fmt: skip

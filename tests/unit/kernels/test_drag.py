@@ -12,6 +12,7 @@ from lgvi_kernels.laws.drag import make_taken
 pytestmark = pytest.mark.kernel
 
 
+@pytest.mark.ci
 def test_what_drag_takes():
     Lane = lane(2, wp.float64)
     linear, quadratic, whole = make_taken(True, False), make_taken(False, True), make_taken(True, True)

@@ -10,6 +10,7 @@ from lgvi_kernels.lanes.peak import CHAINS, make_peak
 pytestmark = pytest.mark.kernel
 
 
+@pytest.mark.ci
 def test_the_sum_of_the_chains():
     kernel, Lane = make_peak(2, wp.float64)
     m, c, starts = np.array([3.0, 2.0]), np.array([5.0, 7.0]), 2.0 ** np.arange(CHAINS)

@@ -61,6 +61,7 @@ def added():
     return given, dict(zip(found, out.numpy()[0].reshape(12, 3, WIDTH).transpose(0, 2, 1), strict=True))
 
 
+@pytest.mark.ci
 def test_a_move_goes_into_the_low_part(added):
     x, found = added
     np.testing.assert_array_equal(found["place"], x["b"] + x["b_low"])

@@ -58,6 +58,7 @@ def turned():
     return v, low, t[:, 0], s[:, 0], values
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("axis", range(3))
 def test_a_turn_about_an_axis(turned, axis):
     v, low, t, s, values = turned

@@ -274,6 +274,7 @@ def bias_by_hand(run, truth):
     return {f"position_{name}": math.sqrt(np.mean(np.square(v))) for name, v in (("mean", means), ("std", spreads))}
 
 
+@pytest.mark.ci
 def test_every_measurement_is_as_by_hand(scene):
     """Errors to the last time at which the reference agrees with itself; one member is stopped before."""
     runs = Runs({"psi_s": 2e-2, "psi_x": 1e-2, "rk4": math.inf}, {("psi_s", "float32"): 0.5, ("psi_s", "float64"): 3.0},
@@ -399,6 +400,7 @@ def test_a_scene_without_a_precise_method_has_no_reference(scene):
     assert "Name one that it takes: methods=[...]" in said
 
 
+@pytest.mark.ci
 def test_a_reference_too_rough_is_refused_with_what_would_do(scene):
     """From the first time on; later than the time asked for; and where time was short."""
     early, late, busy = Runs({}, late={"rk8": 0.1}), Runs({}, late={"rk8": 1.5}), Runs({"rk8": 1e6})
@@ -691,6 +693,7 @@ def test_without_time_what_was_asked_for_by_name_is_tried(scene):
     assert {one.setting.text for one in unasked.measurements} == {"kl8(psi_x) float64"}
 
 
+@pytest.mark.ci
 @pytest.mark.slow_but("suggest")
 @pytest.mark.parametrize("study", ["tradeoff", "suggest"])
 def test_time_that_other_programs_take_does_not_end_a_search(scene, study):

@@ -161,6 +161,7 @@ def test_samples_are_read_from_any_sequence():
     assert lw.SaveAt(at=range(3)) == lw.SaveAt(at=[0.0, 1.0, 2.0])
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_a_run_over_a_period_goes_on_to_the_bit():
     T = 2.0 * np.pi

@@ -29,6 +29,7 @@ def drawn(rng):
     return matrix / size[:, None] / size**2, size
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("seeds", [range(12), pytest.param(range(12, 200), marks=pytest.mark.slow)])
 def test_the_least_power_decides(seeds):
     found = []

@@ -70,6 +70,7 @@ def test_of_a_store_a_file_a_part_and_single_precision(result, tmp_path):
     assert_is_of(solved(dtype="float32").frame(), solved(dtype="float32"))
 
 
+@pytest.mark.ci
 def test_without_the_end_the_last_samples_are_read(result, tmp_path):
     fewer = dataclasses.replace(result, end=None)
     assert fewer.frame().equals(result.frame())
@@ -79,6 +80,7 @@ def test_without_the_end_the_last_samples_are_read(result, tmp_path):
     assert stored.frame().equals(result.frame())
 
 
+@pytest.mark.ci
 def test_one_member_and_what_was_not_kept():
     one = solved(1).frame()
     assert list(one.columns[:2]) == ["outcome", "end_time"]
@@ -97,6 +99,7 @@ def test_without_pandas_the_extra_is_named(result, monkeypatch):
         result.frame()
 
 
+@pytest.mark.ci
 def test_parameters_are_shown_as_a_table(result, tmp_path):
     solved(store=tmp_path / "run.zarr")
     runs = (

@@ -61,6 +61,7 @@ def made_up(rng, r):
             return model
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("r", [1, 2, 3])
 def test_loops_that_are_made_up(r):
     rng = np.random.default_rng(r)

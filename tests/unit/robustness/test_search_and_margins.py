@@ -142,6 +142,7 @@ def test_spread_points_meet_what_they_are_said_to(d):
     assert box.least_peak(10_000) == pytest.approx(3e-4, rel=0.01)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("name", ["sphere", "valley", "many valleys"])
 def test_an_answer_is_never_worse_for_what_is_spent_more(name):
     costs = {

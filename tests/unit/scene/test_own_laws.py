@@ -71,6 +71,7 @@ def test_laws_of_libraries_say_what_they_are():
         assert told(law) == {}
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_a_store_and_a_sweep_take_no_law_for_another(tmp_path):
     scene = lw.Scene.named("sphere")

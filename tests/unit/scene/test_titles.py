@@ -53,6 +53,7 @@ def test_a_scene_keeps_the_text_of_its_file(path):
     assert dataclasses.replace(scene, start=lw.Start()).source == {} == lw.Scene.named("sphere").source
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_the_provenance_of_a_run_has_both(path, tmp_path):
     result = lw.solve(lw.Scene.load(path))
@@ -62,6 +63,7 @@ def test_the_provenance_of_a_run_has_both(path, tmp_path):
     assert lw.Result.load(tmp_path / "result.npz").provenance == result.provenance
 
 
+@pytest.mark.ci
 @pytest.mark.kernel
 def test_a_comment_and_a_title_make_no_other_run(path, tmp_path):
     """A store goes on after both were changed: no number depends on them."""

@@ -60,6 +60,7 @@ def footprint(places, *arguments, **named):
     return lw.studies.footprint(run_to(places, **named), *arguments)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("df", [3, 5, 10, math.inf])
 def test_areas_are_those_of_the_t_distribution(df):
     """Their mean error is below that of the sample, and what the choice among bandwidths leaves; intervals hold the truth."""
@@ -74,6 +75,7 @@ def test_areas_are_those_of_the_t_distribution(df):
         assert binom.cdf(covered, seeds, 0.95) > 1e-3
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("n", [40, 400])
 def test_intervals_of_few_members_hold_the_area(n):
     """At 95 %, or as often as 30 seeds can tell."""
@@ -82,6 +84,7 @@ def test_intervals_of_few_members_hold_the_area(n):
     assert all(each.high > each.low for each in found)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("n, bias", [(200, 0.107), (1_000, 0.033), (10_000, 0.005)])
 def test_an_edge_widens_the_outermost_region(n, bias):
     """A uniform disc: the bias of the page on footprints."""
@@ -195,6 +198,7 @@ def test_weights_count():
     assert contains_xy(shape, *places[at].T).mean() == pytest.approx(0.9, abs=4.0 * math.sqrt(0.09 / 1_500))
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("far, messages", [
     ([(1e5, 3e4)], ["1 member lies"]), ([(1e9, 0.0)], ["1 member lies"]), ([(40.0, -40.0)], ["1 member lies"]),
     ([(1e6, 3e5), (-1e4, 1e4), (0.0, 200.0)], ["3 members lie"]),

@@ -72,6 +72,7 @@ def held(limit, d, p, seeds, **more):
     return sum(low <= p <= high for low, high in intervals)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("alone", [False, True], ids=["one function", "conditions"])
 def test_a_mode_that_no_level_leads_to_is_in_the_answer(alone):
     limit, p = two_modes(1000.0, 0.5, alone=alone)

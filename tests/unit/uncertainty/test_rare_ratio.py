@@ -55,6 +55,7 @@ def compared(first, second, seed, seed_of_second=None, **more):
     return ratio_of(a, b, *shares)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("weighted", [True, False], ids=["weights", "chains"])
 def test_the_ratio_is_that_of_the_normal_law(weighted):
     near, far = -ndtri(1e-5), -ndtri(4e-6)

@@ -155,6 +155,7 @@ def test_bluerov2_thrusters_reach_every_motion():
     assert len(t["coefficient"]) == len(t["command"]) == 8
 
 
+@pytest.mark.ci
 def test_bluerov2_thrust_is_the_published_curve():
     """Eq. 18 of von Benzon et al. 2022; a quarter of the greatest thrust, as of c V|V|, is 46 % of it at V = 0.5."""
     scene = lw.Scene.from_dict({"vehicle": {"name": "bluerov2_heavy"}})

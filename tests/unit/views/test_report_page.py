@@ -133,6 +133,7 @@ def test_numbers_of_python_are_in_no_file(tmp_path):
     assert text == TEXT
 
 
+@pytest.mark.ci
 def test_a_scene_of_no_file_names_its_vehicle(tmp_path):
     import tomllib
 
@@ -169,6 +170,7 @@ def test_without_a_text_of_a_file_its_tables_are_told(tmp_path, source):
     assert "[vehicle]" in last_pre(page_of(result, tmp_path))
 
 
+@pytest.mark.ci
 def test_pictures_suit_the_run(tmp_path):
     """One outcome: the summary. Two, and inputs that vary: the inputs as well. No samples: the shares."""
     ends = fleet(400)
